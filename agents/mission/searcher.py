@@ -82,6 +82,8 @@ _LEAST_RECOGNIZED: Final = 0.1
 """The least share of the people in an image that a camera must recognize from the height of the search."""
 _LOOKED_NS: Final = 10 * S
 """How long a UAV looks for a survivor before the verdict that the survivor is inside a building."""
+_DOUBTED_NS: Final = 45 * S
+"""How long it waits until it is clear in which building."""
 _DEPLOY: Final = 0.9
 """The share of its greatest speed at which the slowest UAV flies to its first place."""
 
@@ -103,7 +105,7 @@ class Searcher:
         mission, reach_m, speed_m_s = scenario.mission, scenario.radio.range_m, approach_speed_m_s(scenario, node)
         self._random = stream(scenario.seed, "mission", node).random
         self._radio = radio
-        self._looked_at = looked_at = LookedAt(min(_view_m(scenario)), height_m=scenario.nodes.altitude_m)
+        self._looked_at = looked_at = LookedAt(_view_m(scenario), height_m=scenario.nodes.altitude_m)
         self._survivors = survivors = KnownSurvivors(phone_model(scenario), looked_at)
         obstacles = KnownObstacles(onboard_map, scenario.world.no_fly_m)
         self._own_motion = own_motion = OwnMotion(position, obstacles)
@@ -330,18 +332,16 @@ class Searcher:
             self._bidding.close(survivor, now_ns=now_ns)
 
     def _place_inside(self, now_ns: int) -> None:
-        """Decide whether the survivor at whom this UAV has looked in vain is inside a building."""
-        survivor = self._bidding.survivor
-        arrived_ns = None if survivor is None else self._approach.arrived_ns.get(survivor)
-        if survivor is None or arrived_ns is None or now_ns - arrived_ns < _LOOKED_NS:
-            return
-        known = self._survivors.by_id[survivor]
-        if known.filter.is_seen:
-            return
-        place = place_in_building(known, self._map, self._looked_at.sides)
-        if place is not None:
-            self._announcing.place_inside(survivor, place, now_ns)
-            self._bidding.close(survivor, now_ns=now_ns)
+        """Decide which survivors at whose places this UAV has looked in vain, or still does, are inside buildings."""
+        for survivor in self._survivors.sought():
+            known, arrived_ns = self._survivors.by_id[survivor], self._approach.arrived_ns.get(survivor)
+            if arrived_ns is None or now_ns - arrived_ns < _LOOKED_NS or known.filter.is_seen:
+                continue
+            patient = now_ns - arrived_ns < _DOUBTED_NS
+            place = place_in_building(known, self._map, self._looked_at.sides, patient=patient)
+            if place is not None:
+                self._announcing.place_inside(survivor, place, now_ns)
+                self._bidding.close(survivor, now_ns=now_ns)
 
     # --- received messages ----------------------------------------------------------------------------------------
 

@@ -22,7 +22,6 @@ from typing import Final
 
 from agents.mission.finding.phone_localization import (
     AS_ASSUMED,
-    CORRELATION_FACTOR,
     REFERENCE_LOSS_DB,
     Estimate,
     PhoneModel,
@@ -49,6 +48,8 @@ _LIKELIHOOD_FLOOR: Final = 0.005
 """This share of the maximum is added to the likelihood of each phone at all offsets."""
 _MOST_READINGS: Final = 40
 """The powers of one phone that are used: those from the nearest places, least often below the threshold."""
+_CORRELATION_FACTOR: Final = 1.5
+"""Places near each other share shadowing, so that the powers of this many count like one independent one."""
 _RARELY_HEARD: Final = 1e-12
 """The least probability of reception in the computation."""
 _GRAIN_DB: Final = 0.25
@@ -80,7 +81,7 @@ def _improbabilities(expected_dbm: float, rssi_dbm: float, threshold_dbm: float,
         mean_dbm = expected_dbm + offset_db
         heard = 0.5 * math.erfc((threshold_dbm - mean_dbm) / spread_db)
         off = (rssi_dbm - mean_dbm) / sigma_db
-        found.append((0.5 * off * off + math.log(max(heard, _RARELY_HEARD))) / CORRELATION_FACTOR)
+        found.append((0.5 * off * off + math.log(max(heard, _RARELY_HEARD))) / _CORRELATION_FACTOR)
     return tuple(found)
 
 

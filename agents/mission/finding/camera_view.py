@@ -21,7 +21,7 @@ _LEAST_FALSE: Final = 1e-5
 """The least probability of a false alarm at a place in one image, whatever is said of the camera."""
 PLACE_M2: Final = math.pi * 6.0 * 6.0
 """The area within which two exact sightings are taken for the same person."""
-_INSIDE: Final = 0.9
+INSIDE: Final = 0.9
 """A person is expected in an image within this share of its half width and height."""
 
 
@@ -53,8 +53,8 @@ class CameraView:
         """True if a place on the ground is well inside the image; both heights are above the ground below the UAV."""
         down_m = here.up - place.up
         return (
-            abs(place.east - here.east) <= _INSIDE * down_m * self._tan_east
-            and abs(place.north - here.north) <= _INSIDE * down_m * self._tan_north
+            abs(place.east - here.east) <= INSIDE * down_m * self._tan_east
+            and abs(place.north - here.north) <= INSIDE * down_m * self._tan_north
         )
 
     def sighting_evidence(self, height_m: float) -> float:

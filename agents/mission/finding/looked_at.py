@@ -8,6 +8,7 @@ walks may be there later. From how many sides it was shown tells whether a wall 
 import math
 from typing import Final
 
+from agents.mission.finding.camera_view import INSIDE
 from fanet_mw.units import Enu, S
 
 _CELL_M: Final = 20.0
@@ -26,16 +27,17 @@ _LOOKS: Final = 3
 class LookedAt:
     """The places that cameras have shown, by cell."""
 
-    def __init__(self, look_m: float = math.inf, *, height_m: float = 1.0) -> None:
-        """`look_m`: how far a camera at `height_m` above ground surely shows people to all sides; infinite: none."""
-        self._look_m, self._per_m = look_m, look_m / max(1.0, height_m)
+    def __init__(self, view_m: tuple[float, float] = (math.inf, math.inf), *, height_m: float = 1.0) -> None:
+        """`view_m`: how far east and north a camera at `height_m` above ground shows it; infinite: none."""
+        self._view_m = INSIDE * view_m[0], INSIDE * view_m[1]
+        self._height_m = max(1.0, height_m)
         self._cells: dict[tuple[int, int], tuple[int, int, int]] = {}
         """Of each cell, when a camera showed it last, how often lately, and from which of four sides, as bits."""
         self._now_ns = self._cleared_ns = 0
 
     @property
     def has_camera(self) -> bool:
-        return math.isfinite(self._look_m)
+        return math.isfinite(self._view_m[0])
 
     @property
     def second(self) -> int:
@@ -47,17 +49,18 @@ class LookedAt:
         self._now_ns = max(self._now_ns, now_ns)
         if not self.has_camera or not self._has_room():
             return
-        look_m, cells, before_ns = min(self._look_m, at.up * self._per_m), self._cells, now_ns - _REMEMBERED_NS
-        column, row, reach = *_cell(at.east, at.north), math.ceil(look_m / _CELL_M)
-        for i in range(column - reach, column + reach + 1):
-            east_m = i * _CELL_M - at.east
-            for j in range(row - reach, row + reach + 1):
-                north_m = j * _CELL_M - at.north
-                if east_m * east_m + north_m * north_m <= look_m * look_m:
-                    looked_ns, looks, sides = cells.get((i, j), _NEVER)
-                    if looked_ns <= before_ns:
-                        looks, sides = 0, 0
-                    cells[i, j] = now_ns, looks + 1, sides | 1 << (2 * (east_m > 0) + (north_m > 0))
+        cells, before_ns = self._cells, now_ns - _REMEMBERED_NS
+        scale = min(1.0, at.up / self._height_m)
+        east_m, north_m = self._view_m[0] * scale, self._view_m[1] * scale
+        columns = range(math.ceil((at.east - east_m) / _CELL_M), math.floor((at.east + east_m) / _CELL_M) + 1)
+        rows = range(math.ceil((at.north - north_m) / _CELL_M), math.floor((at.north + north_m) / _CELL_M) + 1)
+        for i in columns:
+            for j in rows:
+                looked_ns, looks, sides = cells.get((i, j), _NEVER)
+                if looked_ns <= before_ns:
+                    looks, sides = 0, 0
+                side = 2 * (i * _CELL_M > at.east) + (j * _CELL_M > at.north)
+                cells[i, j] = now_ns, looks + 1, sides | 1 << side
 
     def _has_room(self) -> bool:
         """Forget now and then what is old; False if too much is left all the same, as after forged hellos."""

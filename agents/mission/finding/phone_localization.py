@@ -11,8 +11,9 @@ Shadowing at places near each other is nearly the same (Gudmundson, 1991), so ea
 received nearest to its place let expect (Vecchia, Journal of the Royal Statistical Society B 50(2), 1988): residuals
 are whitened, one after the other, and b is integrated out in closed form. The filter is a histogram filter (Thrun,
 Burgard, Fox: Probabilistic Robotics, 2005, chapter 4): both sides of a straight course stay probable until a power from
-elsewhere excludes one. `calibration.py` estimates an offset common to all phones; a recognized owner's position
-replaces the estimate.
+elsewhere excludes one. A place without reception counts for less the more there are beside it (`_news`): taken as
+independent, the many in one shadow drive an estimate to the edge of the area. `calibration.py` estimates an offset
+common to all phones; a recognized owner's position replaces the estimate.
 """
 
 import math
@@ -37,8 +38,6 @@ _COLUMNS: Final = tuple(float(cell % _WIDTH) for cell in range(_WIDTH * _WIDTH))
 _ROWS: Final = tuple(float(cell // _WIDTH) for cell in range(_WIDTH * _WIDTH))
 _OFF_CENTER_M: Final = 120.0
 """A new grid is made when the strongest power was received farther than this from the middle of the present one."""
-CORRELATION_FACTOR: Final = 1.5
-"""Places near each other share shadowing, so that this many without reception count like one independent one."""
 _CORRELATION_M: Final = 50.0
 """The distance over which the correlation of shadowing falls to 1 / e."""
 _READING_DB: Final = 2.5
@@ -118,8 +117,8 @@ class PhoneFilter:
         self._assumed, self._model = model, _calibrated(model, offset)
         self._middle: Enu | None = None
         """The middle of the grid; before the first estimate, the place at which the phone was first received."""
-        self._silent_at: list[Enu] = []
-        """The places without reception, those that wait in `_pending` included."""
+        self._silent_at: dict[Enu, float] = {}
+        """The places without reception, those that wait in `_pending` included, and how much each tells (`_news`)."""
         self._scores: list[float] = []
         """For each cell, twice the logarithm of the likelihood of the places without reception."""
         self._totals: list[float] = []
@@ -163,7 +162,7 @@ class PhoneFilter:
             return
         if _is_sampled(position, self._silent_at):
             return
-        self._silent_at.append(position)
+        self._silent_at[position] = _news(position, self._silent_at)
         self._pending.append((position, None))
 
     def on_sighting(self, place: Estimate | None) -> None:
@@ -179,6 +178,11 @@ class PhoneFilter:
     @property
     def is_seen(self) -> bool:
         return self._seen is not None
+
+    @property
+    def half_m(self) -> float:
+        """Half the side of the square area in which the phone is (`PhoneModel.half_m`)."""
+        return self._model.half_m
 
     @property
     def received_powers(self) -> int:
@@ -282,7 +286,8 @@ class PhoneFilter:
     def _rule_out(self, position: Enu) -> None:
         """Multiply the likelihood of each cell by the probability that a phone there is not received at a place."""
         assert self._middle is not None, "the grid has a middle before samples are added"
-        table = _silence_scores(self._model)
+        news = self._silent_at[position]
+        table = [news * score for score in _silence_scores(self._model)]
         most, sqrt = len(table) - 1, math.sqrt
         up2 = position.up * position.up
         steps = [int(sqrt(d2) / _STEP_M) for d2 in _squared_distances_m2(self._middle, position, up2)]
@@ -380,6 +385,11 @@ def _sum(values: Iterable[float]) -> float:
     return reduce(add, values, 0.0)
 
 
+def _news(position: Enu, silent_at: Iterable[Enu]) -> float:
+    """The share of what silence at a place tells that earlier ones, which share its shadowing, have not told."""
+    return 1 / (1 + math.fsum(math.exp(-_ground_m(position, at) / _CORRELATION_M) for at in silent_at))
+
+
 def _is_sampled(position: Enu, sampled: Iterable[Enu]) -> bool:
     """True if one of the places of earlier samples is so near to a position that both share their shadowing."""
     east, north, hypot = position.east, position.north, math.hypot
@@ -414,12 +424,12 @@ def _residuals_db(middle: Enu, position: Enu, rssi_dbm: float, model: PhoneModel
 
 @lru_cache(maxsize=64)
 def _silence_scores(model: PhoneModel) -> tuple[float, ...]:
-    """Twice the log-probability of no reception, over `CORRELATION_FACTOR`, by distance in steps of `_STEP_M`."""
+    """Twice the log-probability of no reception, by distance in steps of `_STEP_M`."""
     sigma = math.hypot(max(model.shadowing_db, 1.0), model.offset_db)
     scores = []
     for step in range(200):
         distance_m = (step + 0.5) * _STEP_M
         margin = model.power_dbm - REFERENCE_LOSS_DB - 10 * model.exponent * math.log10(distance_m)
         chance = 0.5 * math.erfc((margin - model.threshold_dbm) / (sigma * math.sqrt(2)))
-        scores.append(2 / CORRELATION_FACTOR * math.log(max(chance, _NEVER)))
+        scores.append(2 * math.log(max(chance, _NEVER)))
     return tuple(scores)

@@ -16,6 +16,7 @@ from typing import Final
 
 from agents.mission.search_formation.shapes.contract import (
     BACK,
+    EDGE_M,
     FOLLOW_M,
     FOLLOWER_HIGHER_M,
     Demands,
@@ -35,6 +36,8 @@ _INNER: Final = 0.8
 """At first the middle is within this share of the radio's reach from the ring: UAVs may leave it for there."""
 _BEHIND: Final = 0.4
 """At first a follower is at this share of the ring's half-side, to receive what lies in the middle."""
+_ENOUGH: Final = 0.9
+"""The ring turns `EDGE_M` from the edge if neighbors are at most this share of the greatest distance apart there."""
 _CORNERS: Final = 4
 _CATCHES_UP: Final = 0.6
 """A UAV within this share of half a side from its middle catches up with the ring when it has left it."""
@@ -125,11 +128,13 @@ class Ring(Shape):
 
 def fitted(count: int, demands: Demands) -> Dimensions | None:
     """The ring of this number of UAVs; None if they are too few to span the edge of the area."""
-    half = demands.area_m / 2
-    last = half - demands.edge_m
-    apart_m = min(demands.hop_m, 2 * math.sqrt(demands.seen_m**2 - demands.edge_m**2))
-    of_side = count // _CORNERS
-    if of_side < 2 or of_side * apart_m < 2 * last:
+    half, of_side = demands.area_m / 2, count // _CORNERS
+    for edge_m, share in ((min(EDGE_M, demands.edge_m), _ENOUGH), (demands.edge_m, 1.0)):
+        last = half - edge_m
+        apart_m = share * min(demands.hop_m, 2 * math.sqrt(demands.seen_m**2 - edge_m**2))
+        if of_side >= 2 and of_side * apart_m >= 2 * last:
+            break
+    else:
         return None
     lanes = of_side * _CORNERS
     first = min(lanes * _FIRST_M / 8, _INNER * demands.reach_m, last / 2)

@@ -11,12 +11,12 @@ from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, Estimat
 from fanet_mw.units import US, Enu, S
 from fanet_mw.wire.survivors import Found, Standing
 
-LOOK_M = 36.0
+VIEW_M = (40.0, 40.0)
 
 
 def looks(*at: Enu, since_s: int = 0) -> LookedAt:
     """Cameras were at these places, a second after each other."""
-    looked_at = LookedAt(LOOK_M, height_m=UP_M)
+    looked_at = LookedAt(VIEW_M, height_m=UP_M)
     for second, here in enumerate(at, since_s):
         looked_at.note(here, second * S)
     return looked_at
@@ -54,7 +54,7 @@ def test_a_place_is_shown_after_three_looks_and_for_two_minutes() -> None:
 
 
 def test_what_is_remembered_is_bounded_whatever_hellos_say() -> None:
-    looked_at = LookedAt(LOOK_M, height_m=UP_M)
+    looked_at = LookedAt(VIEW_M, height_m=UP_M)
     for second in range(301):
         for other in range(20):
             looked_at.note(Enu(1000 * second, 1000 * other, UP_M), second * S)
@@ -72,8 +72,17 @@ def test_a_camera_shows_less_from_below_and_nothing_on_the_ground(up_m: float, s
     assert [east_m for east_m in (0, 20, 40) if looked_at.has_shown(east_m, 0)] == list(range(0, int(shown_m) + 1, 20))
 
 
+def test_an_image_shows_more_to_the_east_and_west_than_to_the_north_and_south_as_it_is_wide() -> None:
+    looked_at = LookedAt((65.0, 36.6), height_m=UP_M)
+    for second in range(3):
+        looked_at.note(Enu(0, 0, UP_M), second * S)
+    assert looked_at.has_shown(40, 20)
+    assert not looked_at.has_shown(20, 40)
+    assert not looked_at.has_shown(60, 20), "nobody is expected at the very edge of an image"
+
+
 def test_a_place_is_looked_at_from_as_many_sides_as_it_was_passed_on_and_sides_are_forgotten() -> None:
-    looked_at = LookedAt(LOOK_M, height_m=UP_M)
+    looked_at = LookedAt(VIEW_M, height_m=UP_M)
     for second, (north_m, sides) in enumerate(((-15, 1), (-12, 1), (15, 2), (18, 2)), 1):
         looked_at.note(Enu(10, north_m, UP_M), second * S)
         assert looked_at.sides(0, 0) == sides, north_m
@@ -114,7 +123,7 @@ def test_a_phone_heard_from_a_straight_course_is_on_the_side_where_no_camera_has
 def test_where_all_places_were_shown_the_powers_decide_as_before() -> None:
     truth, around = Enu(5, 5, 0), [Enu(60, 0, UP_M), Enu(-40, 40, UP_M), Enu(-30, -60, UP_M)]
     vague = heard(*around, truth=truth, looked_at=LookedAt())
-    everywhere = LookedAt(LOOK_M, height_m=UP_M)
+    everywhere = LookedAt(VIEW_M, height_m=UP_M)
     for second in range(3):
         for east_m in range(-500, 501, 40):
             for north_m in range(-500, 501, 40):
@@ -128,7 +137,7 @@ def test_where_all_places_were_shown_the_powers_decide_as_before() -> None:
 
 def test_an_announced_place_counts_for_nothing_once_cameras_have_looked_there() -> None:
     truth = Enu(200, 0, 0)
-    known = heard(Enu(100, 0, UP_M), truth=truth, looked_at=LookedAt(LOOK_M, height_m=UP_M))
+    known = heard(Enu(100, 0, UP_M), truth=truth, looked_at=LookedAt(VIEW_M, height_m=UP_M))
     own = known.place()
     assert own is not None
     known.announced = told(place(-300, 5), node=7, t_s=1)

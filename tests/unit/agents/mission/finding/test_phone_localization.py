@@ -50,6 +50,18 @@ def test_one_that_passes_straight_leaves_the_side_open_and_silence_elsewhere_set
     assert settled.east_m > 40
 
 
+def test_many_places_without_reception_in_one_shadow_do_not_drive_the_phone_away() -> None:
+    truth, phone = Enu(0, 0, 0), PhoneFilter(MODEL)
+    for node, angle in enumerate(range(-120, 121, 40)):
+        at = Enu(100 * math.cos(math.radians(angle)), 100 * math.sin(math.radians(angle)), 50)
+        phone.on_rssi(node, at, rssi_dbm(truth, at))
+    for west in range(110, 200, 26):
+        for north in range(-52, 53, 26):
+            phone.on_silence(Enu(-west, north, 50))
+    phone.estimate()
+    assert phone.deficit(truth.east, truth.north) < 6.0, "19 of 20 are that near: chi-square, 2 degrees of freedom"
+
+
 @pytest.mark.parametrize(("far_m", "counts"), [(449, True), (450, True), (451, False)])
 def test_that_a_phone_is_not_received_counts_up_to_450_m_from_where_it_was(far_m: float, *, counts: bool) -> None:
     loud = PhoneModel(power_dbm=40, exponent=3, shadowing_db=4, offset_db=1, threshold_dbm=-90)

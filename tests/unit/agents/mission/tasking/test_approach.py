@@ -45,7 +45,7 @@ def test_a_responder_leaves_places_to_another_responder_and_not_to_a_passer_by()
     here, later_ns = Enu(0, 0, UP_M), 5 * S
 
     def looks_at(other: Enu | None, bids: list[Bid]) -> tuple[float, float]:
-        looked_at = LookedAt(36.0, height_m=UP_M)
+        looked_at = LookedAt((40.0, 40.0), height_m=UP_M)
         looked_at.note(here, 0)
         board = Board(FOLLOWER, here, plan=None, looked_at=looked_at)
         if other is not None:

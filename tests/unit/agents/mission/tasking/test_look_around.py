@@ -10,6 +10,7 @@ from agents.mission.tasking.look_around import LookAround
 from fanet_mw.units import Enu, S
 
 LOOK_M = 36.0
+VIEW_M = (40.0, 40.0)
 
 
 def heard_once(truth: Enu, at: Enu) -> PhoneFilter:
@@ -23,7 +24,7 @@ def test_a_uav_that_has_heard_a_phone_once_passes_all_places_where_it_may_be_and
     start, passed = Enu(0, 0, UP_M), 0
     for angle in range(0, 360, 15):
         truth = Enu(80 * math.cos(math.radians(angle)), 80 * math.sin(math.radians(angle)), 0)
-        looked_at = LookedAt(LOOK_M, height_m=UP_M)
+        looked_at = LookedAt(VIEW_M, height_m=UP_M)
         phone, here, look = heard_once(truth, start), start, LookAround(looked_at)
         for step in range(600):
             if step % 10 == 0:
@@ -39,7 +40,7 @@ def test_a_uav_that_has_heard_a_phone_once_passes_all_places_where_it_may_be_and
 
 
 def test_who_turns_to_another_survivor_looks_where_that_one_may_be_and_otherwise_keeps_its_place() -> None:
-    look, here, far = LookAround(LookedAt(LOOK_M, height_m=UP_M)), Enu(0, 0, UP_M), Enu(900, 0, UP_M)
+    look, here, far = LookAround(LookedAt(VIEW_M, height_m=UP_M)), Enu(0, 0, UP_M), Enu(900, 0, UP_M)
     near_one, far_one = heard_once(Enu(80, 0, 0), here), heard_once(Enu(820, 0, 0), far)
     assert look.next_place(1, near_one, here, 0) != look.next_place(2, far_one, here, 0)
     chosen = look.next_place(2, far_one, here, 0)
@@ -55,7 +56,7 @@ def test_without_a_camera_there_is_nothing_to_look_at() -> None:
 
 def test_each_of_two_uavs_takes_the_places_nearer_to_it_where_neither_has_looked() -> None:
     phone, here, other = heard_once(Enu(80, 0, 0), Enu(0, 0, UP_M)), Enu(30, 0, UP_M), Enu(-30, 0, UP_M)
-    looked_at = LookedAt(LOOK_M, height_m=UP_M)
+    looked_at = LookedAt(VIEW_M, height_m=UP_M)
     mine, theirs = LookAround(looked_at), LookAround(looked_at)
     for step in range(12):
         next_mine = mine.next_place(1, phone, here, step * 4 * S, others=[other])

@@ -40,6 +40,8 @@ In a single one the second may be a false alarm.
 """
 _UNREPORTED_NS: Final = 4 * S
 """How long a person who is certainly there waits, near phones without an owner, before being reported without one."""
+_PLACED_NS: Final = 2 * S
+"""The same where no phone is heard: seen from farther aside, people are placed more exactly."""
 _SURE_M: Final = 3.5
 """The greatest standard deviation with which a person is reported without a phone."""
 _GATE: Final = 16.0
@@ -238,7 +240,7 @@ class Identities:
             for person in self._people
             if person.find is None
             and person.proven_ns is not None
-            and (now_ns - person.proven_ns >= _UNREPORTED_NS or not self._unconfirmed_near([person.place]))
+            and now_ns - person.proven_ns >= (_UNREPORTED_NS if self._unconfirmed_near([person.place]) else _PLACED_NS)
             and person.place.sigma_m <= _SURE_M
             and (person.together >= _TOGETHER or not (person.confirmed or self._is_beside_a_find(person)))
         ]

@@ -21,6 +21,8 @@ from fanet_mw.wire import PRIORITY_REPORT, PRIORITY_SAFETY, frames, system_id
 
 PRESENCE_NS: Final = 2 * S
 """How often UAVs are told that an operator is there."""
+_MOST_PRESENT: Final = 8
+"""Ground stations whose heartbeats are told in this time."""
 MOST_PER_S: Final = 40
 """Packets that operators may put on the air in a second; what is more must be said again."""
 _UNDER_WAY_NS: Final = 1_200 * MS
@@ -57,7 +59,7 @@ class OperatorRelay(Application):
     def __init__(self, scenario: Scenario) -> None:
         self._nodes = {system_id(node): NodeId(node) for node in scenario.uav_ids}
         self._told_ns: dict[int, int] = {}
-        """When the heartbeat of each ground station was told last, by its system."""
+        """When the heartbeat of each ground station was told, by its system; for `PRESENCE_NS`."""
         self._asked: dict[tuple[int, int, int, bytes], int] = {}
         """When each question was put on the air last, the newest at the end."""
         self._second, self._in_second = -1, 0
@@ -106,11 +108,10 @@ class OperatorRelay(Application):
         return False
 
     def _presence(self, data: bytes, system: int, now_ns: int) -> None:
-        if len(self._told_ns) < 8 or system in self._told_ns:
-            last_ns = self._told_ns.get(system)
-            if last_ns is None or now_ns - last_ns >= PRESENCE_NS:
-                self._told_ns[system] = now_ns
-                self._send(data, BROADCAST, PRIORITY_REPORT, now_ns)
+        self._told_ns = {of: told_ns for of, told_ns in self._told_ns.items() if now_ns - told_ns < PRESENCE_NS}
+        if system not in self._told_ns and len(self._told_ns) < _MOST_PRESENT:
+            self._told_ns[system] = now_ns
+            self._send(data, BROADCAST, PRIORITY_REPORT, now_ns)
 
     def _send(self, together: bytes, to: int, priority: int, now_ns: int) -> None:
         if now_ns // S != self._second:

@@ -48,7 +48,9 @@ class Announcing:
     def __init__(self, node: NodeId, survivors: KnownSurvivors, outbox: Outbox) -> None:
         self._node = node
         self._survivors, self._outbox = survivors, outbox
-        self._persons = 0
+        self._persons = -1
+        """The number of this UAV's latest find of a person. They count up at least as fast as seconds pass, so that a
+        program that was started again begins above its earlier ones."""
         self._took_over: set[int] = set()
         """The finds in whose favor this UAV has given up a person."""
         self._told: dict[int, Estimate] = {}
@@ -99,8 +101,9 @@ class Announcing:
 
     def report_person(self, place: Estimate, now_ns: int) -> None:
         """Somebody was seen who carries no phone that fits: flood that a person is there."""
-        person = person_id(self._node, self._persons)
-        self._persons += 1
+        self._persons = max(self._persons + 1, now_ns // S)
+        while (person := person_id(self._node, self._persons)) in self._survivors.persons:
+            self._persons += 1
         self._decide(Found(now_ns // US, person, *place, self._node, Standing.CONFIRMED), Confirmed, now_ns)
 
     def give_up_doubles(self, now_ns: int, *, steady_m2: float) -> None:

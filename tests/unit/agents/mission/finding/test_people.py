@@ -166,8 +166,8 @@ def told_person(node: int, east_m: float, north_m: float, *, number: int = 0) ->
 def test_of_two_who_found_one_person_the_one_with_the_lower_id_keeps_the_find_and_two_people_stay_two() -> None:
     survivors, outbox = KnownSurvivors(MODEL), Outbox()
     announcing = Announcing(NodeId(7), survivors, outbox)
-    announcing.report_person(PLACE, S)
-    announcing.report_person(PLACE._replace(east_m=3.0), S)
+    announcing.report_person(PLACE, 0)
+    announcing.report_person(PLACE._replace(east_m=3.0), 0)
     survivors.on_found(told_person(3, 0.5, 0.5), now_ns=S)
     survivors.on_found(told_person(9, 3.0, 0.0), now_ns=S)
     for _ in range(3):

@@ -176,8 +176,8 @@ def test_a_verdict_states_who_made_it_when_and_where() -> None:
     uav = Uav(node=7)
     uav.announcing.report_person(PLACE, 3 * S)
     uav.announcing.report_person(PLACE._replace(north_m=99.0), 3 * S)
-    assert uav.survivors.persons[person_id(7, 0)] == Found(3 * S // US, person_id(7, 0), *PLACE, 7, Standing.CONFIRMED)
-    assert person_id(7, 1) in uav.survivors.persons
+    assert uav.survivors.persons[person_id(7, 3)] == Found(3 * S // US, person_id(7, 3), *PLACE, 7, Standing.CONFIRMED)
+    assert person_id(7, 4) in uav.survivors.persons
     uav.estimate(4.0)
     uav.announcing.confirm(1, 5 * S)
     confirmed = uav.survivors.by_id[1].confirmed
@@ -188,9 +188,21 @@ def test_a_verdict_states_who_made_it_when_and_where() -> None:
     assert uav.out.records[-1] == Refuted(9 * S, NodeId(7), 1, 0.0, 0.0)
 
 
+def test_whom_a_uav_finds_after_a_restart_is_nobody_whom_it_found_before() -> None:
+    before, others = Uav(node=7), Uav(node=2)
+    before.announcing.report_person(PLACE, 3 * S)
+    restarted = Uav(node=7)
+    restarted.survivors.on_found(Found(20 * S // US, person_id(7, 20), *PLACE, 7, Standing.CONFIRMED), now_ns=20 * S)
+    restarted.announcing.report_person(PLACE._replace(north_m=99.0), 20 * S)
+    for uav in (before, restarted):
+        for found in uav.survivors.persons.values():
+            others.survivors.on_found(found, now_ns=21 * S)
+    assert {round(found.north_m) for found in others.survivors.persons.values()} == {round(PLACE.north_m), 99}
+
+
 def test_who_gives_up_a_person_does_so_for_one_of_a_lower_id_and_says_since_when() -> None:
     uav = Uav(node=7)
-    uav.announcing.report_person(PLACE, S)
+    uav.announcing.report_person(PLACE, 0)
     for other in (9, 3):
         found = Found(S // US, person_id(other, 0), *PLACE._replace(east_m=11.0), other, Standing.CONFIRMED)
         uav.survivors.on_found(found, now_ns=S)

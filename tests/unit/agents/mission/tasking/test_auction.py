@@ -61,6 +61,14 @@ def test_a_winner_that_falls_silent_makes_room_for_the_next() -> None:
     assert auction.winners(1, count=1, now_ns=20 * S) == [3]
 
 
+def test_a_bidder_that_was_silent_and_starts_again_is_believed_though_it_numbers_its_bids_anew() -> None:
+    auction = Auction(NodeId(5))
+    auction.merge([Bid(1, 2, 50, 40)], now_ns=0)
+    for now_s, wins in ((15, []), (16, [2])):
+        auction.merge([Bid(1, 2, 50, 1)], now_ns=now_s * S)
+        assert auction.winners(1, count=1, now_ns=(now_s + 1) * S) == wins, "one that was heard lately is a late copy"
+
+
 def test_a_bid_of_a_dead_uav_grows_older_at_each_hop_and_is_forgotten_by_all() -> None:
     """Two neighbors tell each other of it every 0.7 s, in whole seconds of age."""
     first, second = Auction(NodeId(5)), Auction(NodeId(6))

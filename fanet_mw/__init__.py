@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         FlightState,
         Gps,
         Inertial,
+        LandingTarget,
         Radar,
         SensorReading,
         Voice,
@@ -45,8 +46,8 @@ _HOMES: Final = {
         "ANY", "HOME", "AppPort", "Application", "Course", "Data", "Fate", "Received", "Status",
     ),
     "fanet_mw.bus.messages": (
-        "Altimeter", "Battery", "Camera", "CameraImage", "FlightState", "Gps", "Inertial", "Radar", "SensorReading",
-        "Voice", "WifiScan", "WindEstimate",
+        "Altimeter", "Battery", "Camera", "CameraImage", "FlightState", "Gps", "Inertial", "LandingTarget", "Radar",
+        "SensorReading", "Voice", "WifiScan", "WindEstimate",
     ),
     "fanet_mw.errors": (
         "BusError", "ConfigError", "DropReason", "FanetError", "LocalProtocolError", "MalformedFrameError",
@@ -63,10 +64,10 @@ _HOME_OF: Final = {name: module for module, names in _HOMES.items() for name in 
 __all__ = [
     "Altimeter", "ANY", "Application", "AppPort", "Battery", "BROADCAST", "BusError", "Camera", "CameraImage",
     "ConfigError", "Course", "Data", "DropReason", "Emulated", "Enu", "FanetError", "Fate", "FlightState", "Gps",
-    "HOME", "Inertial", "Launched", "LocalProtocolError", "MalformedFrameError", "Message", "Node", "NodeClosedError",
-    "NodeId", "OnAir", "Radar", "Received", "Result", "Scenario", "SensorReading", "Sent", "Status", "VirtualSwarm",
-    "Voice", "WifiScan", "WindEstimate", "__version__", "join", "launch", "load_result", "load_scenario",
-    "simulate",
+    "HOME", "Inertial", "LandingTarget", "Launched", "LocalProtocolError", "MalformedFrameError", "Message", "Node",
+    "NodeClosedError", "NodeId", "OnAir", "Radar", "Received", "Result", "Scenario", "SensorReading", "Sent", "Status",
+    "VirtualSwarm", "Voice", "WifiScan", "WindEstimate", "__version__", "join", "launch", "load_result",
+    "load_scenario", "simulate",
 ]  # fmt: skip
 
 

@@ -48,7 +48,7 @@ PAGES: Final = {
         "Applications": ("Application", "AppPort", "Data", "Received", "Status", "Fate", "Course", "ANY", "HOME"),
         "What a vehicle perceives": (
             "Gps", "SensorReading", "WifiScan", "Camera", "CameraImage", "Voice", "Radar", "Altimeter", "Inertial",
-            "Battery", "FlightState", "WindEstimate",
+            "Battery", "FlightState", "WindEstimate", "LandingTarget",
         ),
     }),
 }  # fmt: skip

@@ -93,6 +93,7 @@ NAMED: Final[dict[type[Any], Names]] = {
     m.Battery: Names("world/<id>/sensor/battery", "t_ns voltage_v current_a charge"),
     m.FlightState: Names("world/<id>/sensor/flight", "t_ns roll_rad pitch_rad yaw_rad satellites hdop unix_ns"),
     m.WindEstimate: Names("world/<id>/sensor/wind", f"t_ns {_MOVES}"),
+    m.LandingTarget: Names("world/<id>/sensor/pad", f"t_ns {_VECTOR}"),
 }  # fmt: skip
 
 

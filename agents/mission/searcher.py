@@ -54,6 +54,7 @@ from fanet_mw.bus.messages import (
     Altimeter,
     Battery,
     Camera,
+    LandingTarget,
     Radar,
     SensorReading,
     Voice,
@@ -300,6 +301,8 @@ class Searcher:
                     self._leave(now_ns)
             case WindEstimate():
                 self._return_home.on_wind(reading.velocity)
+            case LandingTarget():
+                self._return_home.on_pad(reading.offset, now_ns)
             case Radar():
                 self._radar.scan(reading.echoes, now_ns=now_ns)
             case _:

@@ -299,6 +299,7 @@ _CODECS: Final = {
     28: _plain(m.ClockRequest, "<d", _check_pace),
     29: _plain(m.FlightState, "<q3dBdq", _check_flight),
     30: _plain(m.WindEstimate, "<q3d", _finite),
+    31: _plain(m.LandingTarget, "<q3d", _finite),
 }  # fmt: skip
 CODES: Final = {codec.kind: code for code, codec in _CODECS.items()}
 HEADS: Final = {codec.kind: codec.structs for codec in _CODECS.values()}

@@ -282,6 +282,15 @@ class WindEstimate(NamedTuple):
     """The velocity of the air over ground [m/s]."""
 
 
+class LandingTarget(NamedTuple):
+    """World -> one UAV: its camera sees the marker on its own pad, as MAVLink's LANDING_TARGET tells it."""
+
+    t_ns: int
+    """The swarm instant of the image."""
+    offset: Enu
+    """From the UAV to the pad [m]."""
+
+
 class MavlinkTap(NamedTuple):
     """UAV -> inspectors and ground stations: MAVLink bytes as the node produced or delivered them."""
 
@@ -340,7 +349,17 @@ class Report:
 
 
 SensorReading = (
-    WifiScan | Camera | CameraImage | Voice | Radar | Altimeter | Inertial | Battery | FlightState | WindEstimate
+    WifiScan
+    | Camera
+    | CameraImage
+    | Voice
+    | Radar
+    | Altimeter
+    | Inertial
+    | Battery
+    | FlightState
+    | WindEstimate
+    | LandingTarget
 )
 """Any reading of a sensor other than the position fix; a new kind of sensor is one more member of this union."""
 

@@ -9,7 +9,8 @@ fanet/<swarm>/world/obstruction      Obstructions
 fanet/<swarm>/world/<id>/setpoint    Setpoint               UAV -> world
 fanet/<swarm>/world/<id>/sensor/gps  Gps
 fanet/<swarm>/world/<id>/sensor/wifi WifiScan; camera: Camera, voice: Voice, radar: Radar, altimeter: Altimeter,
-inertial: Inertial, battery: Battery, image: CameraImage, flight: FlightState, wind: WindEstimate
+inertial: Inertial, battery: Battery, image: CameraImage, flight: FlightState, wind: WindEstimate,
+pad: LandingTarget
 fanet/<swarm>/mavlink/<id>           MavlinkTap             UAV -> observers, gateways
 fanet/<swarm>/mavlink/<id>/in        MavlinkTap             gateway -> UAV
 fanet/<swarm>/ground/order           Order                  anyone -> the post on the ground

@@ -10,7 +10,7 @@ import argparse
 import math
 from collections.abc import Sequence
 
-from fanet_mw.trace import Collided, FlightModeChanged, MissionModeChanged, Posed
+from fanet_mw.trace import Collided, MissionModeChanged, Posed
 from fanet_mw.units import S
 from sim.records.record_kinds import records_of
 from sim.run.virtual import simulate
@@ -36,8 +36,8 @@ def line(pads_m: float, wind_m_s: float, side: str, settings: Sequence[str]) -> 
     pads = positions(scenario)
     off = [math.dist((at.east_m, at.north_m, at.up_m), pads[node - 1]) for node, at in sorted(last.items())]
     left = [r.t_ns / S for r in records_of(outcome.records, MissionModeChanged) if r.mode == "return"]
-    landed = [r.t_ns / S for r in records_of(outcome.records, FlightModeChanged) if r.mode == "land"]
-    took_s = max(landed) - min(left) if left and landed else math.nan
+    flies = [r.t_ns / S for r in records_of(outcome.records, Posed) if r.up_m > pads[r.node - 1].up + 1.0]
+    took_s = max(flies) - min(left) if left else math.nan
     contacts = sum(1 for _ in records_of(outcome.records, Collided))
     there = sum(one <= ON_PAD_M for one in off)
     charge = outcome.reports["world"]["least_charge"]

@@ -25,6 +25,7 @@ from fanet_mw.bus.messages import (
     Echo,
     FlightState,
     Inertial,
+    LandingTarget,
     Message,
     Obstructions,
     Person,
@@ -203,6 +204,7 @@ _BY_HAND: Final[tuple[Message, ...]] = (
     Inertial(S, Enu(1.0, 2.0, 3.0)),
     Battery(S, 15.0, 20.0, 0.5),
     WindEstimate(S, Enu(3.0, -1.0, 0.1)),
+    LandingTarget(S, Enu(0.5, -1.0, -20.0)),
     FlightState(S, 0.1, -0.2, 3.0, 14, 0.8, 1_800_000_000 * S),
 )
 

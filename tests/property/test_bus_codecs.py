@@ -23,6 +23,7 @@ from fanet_mw.bus.messages import (
     FlightState,
     Gps,
     Inertial,
+    LandingTarget,
     MavlinkTap,
     Message,
     Obstructions,
@@ -117,6 +118,7 @@ KINDS: dict[type[Any], st.SearchStrategy[Any]] = {
     Altimeter: st.builds(Altimeter, instants, finite, st.none() | finite),
     Inertial: st.builds(Inertial, instants, finite_vectors),
     WindEstimate: st.builds(WindEstimate, instants, finite_vectors),
+    LandingTarget: st.builds(LandingTarget, instants, finite_vectors),
     Battery: st.builds(Battery, instants, finite, finite, finite),
     FlightState: st.builds(
         FlightState,

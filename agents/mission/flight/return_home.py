@@ -1,5 +1,5 @@
 """The return of a UAV whose battery runs low, that hears nobody any more, or whose search is over: it flies home above
-all UAVs that search, then lands straight down.
+all UAVs that search, then lands straight down, on the marker of its own pad once its camera sees it.
 
 Whoever does not know its place gives it up as well: its flight controller holds it, and lands it after a while.
 
@@ -40,6 +40,16 @@ _TURN_S: Final = 14.0
 """The time between two landings beside each other."""
 _LAND_M_S: Final = 1.5
 """The speed of the landing."""
+_SEEN_NS: Final = 1_500 * MS
+"""How long after it was last seen a UAV sinks towards its pad."""
+_SEEN_GAIN: Final = 0.3
+"""The weight of one sighting of the pad against the earlier ones."""
+_TOWARDS_PER_S: Final = 0.5
+"""The speed towards the pad is the distance times this, at most `_ASIDE_M_S`."""
+_ASIDE_M_S: Final = 1.5
+_OFF_M: Final = 0.4
+_LOW_OVER_PAD_M: Final = 2.0
+"""Lower than this over its pad a UAV waits until it is within `_OFF_M` of it, and then sinks straight down."""
 _NO_FIX_NS: Final = 1_500 * MS
 """A UAV does not know its place once it has had no position for so long, nor in the time of so many: by then its flight
 controller holds it, because no velocity is commanded without a position."""
@@ -92,6 +102,10 @@ class ReturnHome:
         self._was_blind = False
         """True once the flight controller has not known its place either: it lands, and may obey nothing further."""
         self.lands = False
+        self._pad: Enu | None = None
+        """The pad, in the UAV's own coordinates, by its marker; None until the camera has seen it on the way home."""
+        self._pad_ns = 0
+        self._touches_down = False
 
     def on_battery(self, charge: float, *, now_ns: int) -> bool:
         self._endurance.reserve = self._limits.reserve
@@ -109,6 +123,15 @@ class ReturnHome:
         """The base is where the receiver says that this UAV stands, so that errors which last are the same later."""
         here = self._own_motion.position
         self._home = self._home._replace(east=here.east, north=here.north)
+
+    def on_pad(self, offset: Enu, now_ns: int) -> None:
+        """The camera sees the marker of this UAV's pad at this offset: there is the base, by its receiver of now."""
+        if not self.leaves:
+            return
+        seen = self._own_motion.position.plus(offset)
+        self._pad = seen if self._pad is None else self._pad.plus(seen.minus(self._pad), _SEEN_GAIN)
+        self._pad_ns = now_ns
+        self._home = self._home._replace(east=self._pad.east, north=self._pad.north)
 
     def on_heard(self, now_ns: int) -> bool:
         """Another UAV was heard; returns True if this one therefore takes part in the mission again."""
@@ -203,5 +226,19 @@ class ReturnHome:
         if nearly and self._own_motion.velocity.horizontal() <= _STANDS_M_S and not self._waits(now_ns):
             self.lands = True
         if self.lands:
-            self._outbox.course = Course(here, _LAND_M_S, land=True)
+            self._outbox.course = self._towards_pad(now_ns) or Course(here, _LAND_M_S, land=True)
         return self.lands
+
+    def _towards_pad(self, now_ns: int) -> Course | None:
+        """The way down to the pad while its marker is seen; None: straight down, as it is not, or right below."""
+        if self._pad is None or self._touches_down or now_ns - self._pad_ns > _SEEN_NS:
+            return None
+        here = self._own_motion.position
+        off = self._pad.minus(here)
+        is_over = off.horizontal() <= _OFF_M
+        self._touches_down = is_over and -off.up <= _LOW_OVER_PAD_M
+        if self._touches_down:
+            return None
+        share = min(_TOWARDS_PER_S, _ASIDE_M_S / max(1e-9, off.horizontal()))
+        sinks_m_s = _LAND_M_S if is_over or -off.up > _LOW_OVER_PAD_M else 0.0
+        return Course(here, _LAND_M_S, velocity=Enu(share * off.east, share * off.north, -sinks_m_s))

@@ -111,6 +111,11 @@ class Sensors(Section):
     """Readings per second of the mean wind, as flight controllers estimate it from how far they lean."""
     wind_sigma_m_s: Length = 1.0
     """Standard deviation of its slow error along each horizontal axis, with a correlation time of 30 s."""
+    pad_hz: Rate = 2.0
+    """Images per second in which a camera that looks down finds the marker on the UAV's own pad; for UAVs that stand on
+    pads (`nodes.on_ground`)."""
+    pad_marker_m: SomeLength = 0.8
+    """Side of that marker."""
     map_share: Annotated[float, Field(ge=0, le=1)] = 1.0
     """Share of the buildings on the map that each UAV of a planned search carries; the map has all hills."""
     gps_common_m: Length = 2.0

@@ -18,6 +18,7 @@ from sim.world.sensors.camera import CameraSensor, ImageSensor
 from sim.world.sensors.contract import Sensor, Truth
 from sim.world.sensors.gps import GpsReceiver
 from sim.world.sensors.inertial import InertialSensor
+from sim.world.sensors.pad import PadSensor
 from sim.world.sensors.phone import PhoneSensor
 from sim.world.sensors.radar import RadarSensor
 from sim.world.sensors.voice import VoiceSensor
@@ -82,6 +83,8 @@ def sensors_of(
         found.append(BatterySensor(scenario, drain))
     if config.wind_hz and engine is not None:
         found.append(WindSensor(scenario, engine))
+    if config.pad_hz and scenario.nodes.on_ground:
+        found.append(PadSensor(scenario))
     return found
 
 

@@ -64,10 +64,11 @@ def test_uavs_for_whom_the_plan_has_no_place_are_noted() -> None:
 @pytest.mark.parametrize(
     ("changes", "told"),
     [
-        (("nodes.spacing_m=4.8",), True),
-        (("nodes.spacing_m=5",), False),
-        (("nodes.spacing_m=3.2", "sensors.gps_bias_m=0.02", "world.gps_sigma_m=0.02"), False),
-        (("nodes.spacing_m=4.8", "nodes.on_ground=false"), False),
+        (("nodes.spacing_m=4.8", "sensors.pad_hz=0"), True),
+        (("nodes.spacing_m=4.8",), False),
+        (("nodes.spacing_m=5", "sensors.pad_hz=0"), False),
+        (("nodes.spacing_m=3.2", "sensors.pad_hz=0", "sensors.gps_bias_m=0.02", "world.gps_sigma_m=0.02"), False),
+        (("nodes.spacing_m=4.8", "sensors.pad_hz=0", "nodes.on_ground=false"), False),
     ],
 )
 def test_pads_that_receivers_confuse_are_noted(changes: tuple[str, ...], *, told: bool) -> None:

@@ -93,6 +93,49 @@ def test_who_hears_nobody_beside_its_pad_lands_at_once(make_scenario: MakeScenar
     assert swarm.landed_s[1] < 12.0
 
 
+def test_a_uav_lands_on_its_pad_by_the_marker_although_its_receiver_errs_otherwise_than_as_it_stood_there(
+    make_scenario: MakeScenario,
+) -> None:
+    one, true, drift = Alone(make_scenario), HOME._replace(east=HOME.east + 1.0), Enu(2.5, -1.5, 3.0)
+    one.back.end()
+    for tick in range(600):
+        now_ns = tick * TICK_NS
+        one.own.position = true.plus(drift, min(1.0, tick / 100))
+        assert one.back.land_if_there(now_ns)
+        if true.up < 30.0 and tick % 3 == 0:
+            one.back.on_pad(Enu(HOME.east - true.east, HOME.north - true.north, -true.up), now_ns)
+        course = one.out.course
+        assert course is not None
+        moves = course.velocity or Enu(0.0, 0.0, -SINK_M_S)
+        true = true.plus(moves, TICK_NS / S)
+        if true.up <= 0.0:
+            break
+    assert true.up <= 0.0
+    assert one.out.course is not None
+    assert one.out.course.land, "it touches down by the landing of its flight controller"
+    assert true.horizontal_to(HOME) < 0.5
+
+
+def test_low_over_the_ground_beside_its_pad_a_uav_goes_there_first_and_lands_where_it_is_if_the_marker_is_hidden(
+    make_scenario: MakeScenario,
+) -> None:
+    one = Alone(make_scenario)
+    one.back.end()
+    assert one.lands(0.0, 0.0)
+    for up_m, sinks in ((5.0, True), (1.9, False)):
+        one.own.position = Enu(HOME.east + 1.0, HOME.north, up_m)
+        one.back.on_pad(Enu(-1.0, 0.0, -up_m), 0)
+        assert one.back.land_if_there(S)
+        course = one.out.course
+        assert course is not None
+        assert course.velocity is not None
+        assert course.velocity.east < 0.0
+        assert (course.velocity.up < 0.0) == sinks
+    assert one.back.land_if_there(2 * S)
+    assert one.out.course is not None
+    assert one.out.course.land, "not seen for 2 s"
+
+
 # --- rules of one return, at their bounds -----------------------------------------------------------------------------
 
 

@@ -463,12 +463,10 @@ def phone_model(scenario: Scenario) -> PhoneModel:
 
 def _view_m(scenario: Scenario) -> tuple[float, float]:
     """How far east and north a camera shows the ground from the search's height; infinite without a camera."""
-    sensors = scenario.sensors
-    if not sensors.camera_hz:
+    if not scenario.sensors.camera_hz:
         return math.inf, math.inf
-    wide_m = scenario.nodes.altitude_m * math.tan(math.radians(sensors.camera_fov_deg) / 2)
-    width, height = sensors.camera_pixels
-    return wide_m, wide_m * height / width
+    east, north = scenario.sensors.tan_half_fov
+    return scenario.nodes.altitude_m * east, scenario.nodes.altitude_m * north
 
 
 def formation(scenario: Scenario, count: int) -> Pattern | None:

@@ -124,15 +124,17 @@ class Confirmations:
         elif type(record) is Refuted and record.survivor in self._held:
             held = self._held[record.survivor]
             self._held[record.survivor] = left = left_by(record, held)
-            self._keep_as_persons(record, [one for one in held if one not in left])
-            self.reopened += not is_person(record.survivor) and len(self._held[record.survivor]) < len(held)
+            if given_up := [one for one in held if one not in left]:
+                self._keep_as_persons(record, since_ns=given_up[0].t_ns)
+                self.reopened += not is_person(record.survivor)
 
-    def _keep_as_persons(self, refuted: Refuted, given_up: Sequence[Confirmed]) -> None:
-        """Whoever takes a confirmation back tells at once that a person is there all the same: found since then."""
+    def _keep_as_persons(self, refuted: Refuted, *, since_ns: int) -> None:
+        """Whoever takes a confirmation back tells at the same instant that a person is there all the same. That person
+        was found when the confirmation was told.
+        """
         for number, finds in self._held.items():
-            same_instant = is_person(number) and finds and finds[0].t_ns == refuted.t_ns
-            if same_instant and given_up and not left_by(refuted, finds):
-                self._as_ns[number] = given_up[0].t_ns
+            if is_person(number) and finds and finds[0].t_ns == refuted.t_ns and not left_by(refuted, finds):
+                self._as_ns[number] = since_ns
 
     def error_m(self, placed: _Placed) -> float:
         at = self._truth[placed.survivor - 1]
@@ -341,10 +343,8 @@ class PhotographedCells(_Cells):
 
     def __init__(self, scenario: Scenario) -> None:
         super().__init__(scenario)
-        sensors = scenario.sensors
-        width, height = sensors.camera_pixels
-        self._tan_east = math.tan(math.radians(sensors.camera_fov_deg) / 2)
-        self._tan_north, self._most_up_m = self._tan_east * height / width, scenario.nodes.altitude_m
+        self._tan_east, self._tan_north = scenario.sensors.tan_half_fov
+        self._most_up_m = scenario.nodes.altitude_m
 
     def add(self, at: Iterable[tuple[float, float, float]]) -> None:
         """UAVs were at these places; over hills they are taken to be at the height of the search."""

@@ -145,10 +145,8 @@ def _close_pads(scenario: Scenario) -> Iterator[str]:
     """Pads so near to each other that UAVs that do not see them may land on each other. The error that all receivers
     have in common is left out, because it moves all landings alike.
     """
-    nodes = scenario.nodes
-    if not nodes.on_ground or scenario.mission.search == "none" or nodes.layout == "explicit":
-        return
-    if scenario.sensors.pad_hz:
+    nodes, search = scenario.nodes, scenario.mission.search
+    if not nodes.on_ground or nodes.layout == "explicit" or search == "none" or scenario.sensors.pad_hz:
         return
     from agents.mission.flight.return_home import LANDS_WITHIN_M
 

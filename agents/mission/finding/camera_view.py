@@ -38,10 +38,9 @@ class CameraView:
     def __init__(self, scenario: Scenario) -> None:
         sensors = scenario.sensors
         self.hz = sensors.camera_hz
-        self._width, height = sensors.camera_pixels
+        self._width, _ = sensors.camera_pixels
         self._cycles = sensors.camera_cycles
-        self._tan_east = math.tan(math.radians(sensors.camera_fov_deg) / 2)
-        self._tan_north = self._tan_east * height / self._width
+        self._tan_east, self._tan_north = sensors.tan_half_fov
         self._false_per_image = sensors.camera_false_per_hour / sensors.camera_hz / 3600 if sensors.camera_hz else 0.0
 
     def recognized(self, height_m: float) -> float:

@@ -28,7 +28,7 @@ _UNKNOWN_M: Final = 40.0
 _STEPS: Final = 4
 """Each cell of the phone's filter is divided into so many rows and columns, because buildings are as small as cells."""
 
-Point = tuple[float, float, float]
+_Point = tuple[float, float, float]
 """A place: its weight, east and north."""
 
 
@@ -40,7 +40,7 @@ def place_in_building(
     """
     if not onboard_map.buildings or not known.is_heard_within(_HEARD_M):
         return None
-    inside, outside = weighed(known, onboard_map, sides)
+    inside, outside = _weighed(known, onboard_map, sides)
     by_building = {building: math.fsum(weight for weight, _, _ in points) for building, points in inside.items()}
     total = math.fsum([*by_building.values(), outside])
     if math.fsum(by_building.values()) < _SURE * total:
@@ -56,11 +56,11 @@ def place_in_building(
     return place if place.sigma_m <= _UNKNOWN_M else None
 
 
-def weighed(
+def _weighed(
     known: KnownSurvivor, onboard_map: OnboardMap, sides: Callable[[float, float], int]
-) -> tuple[dict[Building | None, list[Point]], float]:
+) -> tuple[dict[Building | None, list[_Point]], float]:
     """Where in each building a phone may be, in None for those that the map lacks; and the weight of all outside."""
-    inside: dict[Building | None, list[Point]] = {}
+    inside: dict[Building | None, list[_Point]] = {}
     outside, half_m = 0.0, known.filter.half_m
     for east, north, deficit in known.filter.likely_cells(_LIKELY):
         weight = math.exp(-deficit / 2) / (_STEPS * _STEPS)

@@ -56,6 +56,8 @@ _CONSIDERED: Final = 16.0
 """Places less probable than the most probable one by more than this are not considered elsewhere (twice a log)."""
 _STEP_M: Final = 5.0
 """The step of distance in the table of probabilities without reception."""
+_VAGUE_M: Final = 50.0
+"""The greatest standard deviation of an estimate that is not vague."""
 _SAME_PLACE_M: Final = 25.0
 """Two samples of one node nearer to each other than this share their shadowing; the later one is ignored."""
 
@@ -75,6 +77,11 @@ class Estimate(NamedTuple):
         mean = (self.east_variance_m2 + self.north_variance_m2) / 2
         half = (self.east_variance_m2 - self.north_variance_m2) / 2
         return math.sqrt(mean + math.hypot(half, self.covariance_m2))
+
+    @property
+    def is_vague(self) -> bool:
+        """True for an estimate for which no UAV leaves its place in a team; a follower may go there."""
+        return self.sigma_m > _VAGUE_M
 
     @property
     def at(self) -> Enu:

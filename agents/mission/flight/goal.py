@@ -7,7 +7,7 @@ from agents.mission.flight.errand import Errand
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.search_formation.formation_place import FormationPlace, along
 from agents.mission.tasking.absence import Absence
-from agents.mission.tasking.approach import VAGUE_M, Approach
+from agents.mission.tasking.approach import Approach
 from agents.mission.tasking.bidding import FAR_M
 from agents.mission.tasking.voice_descent import VoiceDescent
 from fanet_mw.units import STILL, Enu
@@ -73,7 +73,7 @@ class Goal:
         for survivor in self._survivors.sought():
             known = self._survivors.by_id[survivor]
             estimate = known.place() if known.filter.near(here, within_m=FAR_M) else None
-            if estimate is None or estimate.sigma_m > VAGUE_M:
+            if estimate is None or estimate.is_vague:
                 continue
             _, aside_m = along(moves, estimate.east_m - lane.east, estimate.north_m - lane.north)
             if abs(aside_m) > 0.5 * pattern.shape.lane_m + _SHARED_M:

@@ -31,10 +31,9 @@ _LEASH_M: Final = 58.0
 _LAG_M: Final = 140.0
 """The greatest distance by which a UAV of a team, or a relay, may be behind its place."""
 _NEARLY_M: Final = 120.0
-"""A UAV that is so near to the survivor to whom it was sent goes on to him, if he is placed so well..."""
-_PLACED_M: Final = 50.0
+"""A UAV goes on to the survivor to whom it was sent once the estimate, unless it is vague, is this near."""
 _ENDS_M: Final = 200.0
-"""... and it is at most so far from its own place: until then its row waits for it, or closes up without it."""
+"""It does so while it is at most this far from its own place: its row waits for it, or closes ranks without it."""
 
 
 _CLOSES_S: Final = 15.0
@@ -224,7 +223,7 @@ class FormationPlace:
     def finishes(self, estimate: Estimate | None, now_ns: int) -> bool:
         """True in the sweep for a UAV that nearly is where a survivor is placed, and not yet far from its own place."""
         here = self._own_motion.position
-        if estimate is None or estimate.sigma_m > _PLACED_M or not self.is_taken_up(now_ns):
+        if estimate is None or estimate.is_vague or not self.is_taken_up(now_ns):
             return False
         return estimate.distance_m(here) <= _NEARLY_M and self.lane(now_ns)[0].horizontal_to(here) <= _ENDS_M
 

@@ -33,8 +33,6 @@ _FIRST_RADIUS_M: Final = 14.0
 _MEASURED_M: Final = 200.0
 """A responder that is this near to the mean of a vague estimate goes round from one probable place to the next, which
 tells the powers there as well; it has come to no place yet."""
-VAGUE_M: Final = 50.0
-"""An estimate with a greater standard deviation makes no UAV leave its place in a team; a follower may go there."""
 
 
 class Approach:
@@ -77,7 +75,7 @@ class Approach:
         arrived_ns = self.arrived_ns.get(survivor)
         if arrived_ns is None:
             away_m = place.distance_m(self._own_motion.position)
-            if responding and place.sigma_m > VAGUE_M and away_m < _MEASURED_M:
+            if responding and place.is_vague and away_m < _MEASURED_M:
                 phone = self._survivors.by_id[survivor].filter
                 return self._place_to_look_at(survivor, phone, now_ns) or (place.east_m, place.north_m)
             if away_m > self._arrival_m:

@@ -57,7 +57,7 @@ class Auction:
             if bid.bidder == self._node:
                 if not newer(following(self._serial, bits=_SERIAL_BITS), bid.serial, bits=_SERIAL_BITS):
                     self._serial = bid.serial
-            elif known is None or self._is_over(known, now_ns) or _replaces(bid.serial, stood_ns, known):
+            elif known is None or _is_over(known, now_ns) or _replaces(bid.serial, stood_ns, known):
                 of_task[bid.bidder] = _KnownBid(bid.eta_ds, bid.serial, stood_ns)
 
     def close(self, survivor: int) -> None:
@@ -107,11 +107,12 @@ class Auction:
 
     def _counts(self, bidder: int, known: _KnownBid, now_ns: int) -> bool:
         """True for a bid of this node, and for one that its bidder has stated recently."""
-        return bidder == self._node or not self._is_over(known, now_ns)
+        return bidder == self._node or not _is_over(known, now_ns)
 
-    def _is_over(self, known: _KnownBid, now_ns: int) -> bool:
-        """True for a bid that its bidder has not stated for so long that it may number its bids anew: it restarted."""
-        return now_ns - known.stood_ns > _FORGOTTEN_NS
+
+def _is_over(known: _KnownBid, now_ns: int) -> bool:
+    """True for a bid that its bidder has not stated for long. If it was started again, it numbers its bids anew."""
+    return now_ns - known.stood_ns > _FORGOTTEN_NS
 
 
 def _replaces(serial: int, stood_ns: int, known: _KnownBid) -> bool:

@@ -18,7 +18,7 @@ from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox
 from agents.mission.search_formation.formation_place import FormationPlace, along
 from agents.mission.tasking.absence import Absence
-from agents.mission.tasking.approach import VAGUE_M, Approach
+from agents.mission.tasking.approach import Approach
 from agents.mission.tasking.auction import Auction
 from agents.mission.tasking.voice_descent import descent_ns
 from fanet_mw.scenario import Scenario
@@ -151,7 +151,7 @@ class Bidding:
                 if now_ns - self._approach.arrived_ns.get(self.survivor, now_ns) > self._patience_ns:
                     self._approach.forget(self.survivor)
                 place = self._survivors.by_id[self.survivor].place()
-                measures_ns = _MEASURES_NS if place is not None and place.sigma_m > VAGUE_M else 0
+                measures_ns = _MEASURES_NS if place is not None and place.is_vague else 0
                 self._due_ns = now_ns + measures_ns
                 self._due_ns += round(distance_m / self._cruise_m_s * S) if math.isfinite(distance_m) else 0
         if self.survivor is not None:
@@ -203,7 +203,7 @@ class Bidding:
         if place is None or not self._formation.leads_by(place, lane, moves):
             return False
         ahead_m, _ = along(moves, place.east_m - lane.east, place.north_m - lane.north)
-        return place.sigma_m <= VAGUE_M or ahead_m > 0
+        return not place.is_vague or ahead_m > 0
 
     def _is_in_time(self, at: Enu, now_ns: int, *, after_s: float = 0.0) -> bool:
         """True if this UAV has a plan, and is at its place in time (`_LATE_S`) if it leaves a position then."""
@@ -236,7 +236,7 @@ class Bidding:
 
     def _note_place(self, survivor: int, known: KnownSurvivor, now_ns: int) -> None:
         place = None if survivor in self._located else known.place()
-        if place is not None and place.sigma_m <= VAGUE_M:
+        if place is not None and not place.is_vague:
             self._located.add(survivor)
             east_m, north_m = round(place.east_m, 2), round(place.north_m, 2)
             self._outbox.records.append(Located(now_ns, self._node, survivor, east_m, north_m))
@@ -246,7 +246,7 @@ class Bidding:
         is_near = known.filter.near(self._own_motion.position, within_m=FAR_M)  # who is far need not know the place
         if is_near and not self._formation.is_taken_up(now_ns):
             place = known.place()
-            if place is None or place.sigma_m > VAGUE_M:
+            if place is None or place.is_vague:
                 return _BEFORE_SWEEP * self._config.responders
         if len(known.reporters) >= self._config.reports_to_approach:
             return self._config.responders
@@ -292,4 +292,4 @@ class Bidding:
 
 def _absent(place: Estimate) -> int:
     """The number of UAVs that may leave the formation for a survivor who is estimated there."""
-    return _ABSENT_VAGUE if place.sigma_m > VAGUE_M else _ABSENT
+    return _ABSENT_VAGUE if place.is_vague else _ABSENT

@@ -150,6 +150,13 @@ class Sensors(Section):
         return self
 
     @property
+    def tan_half_fov(self) -> tuple[float, float]:
+        """How far east and north of a UAV its camera shows the ground, per metre of height."""
+        width, height = self.camera_pixels
+        east = math.tan(math.radians(self.camera_fov_deg) / 2)
+        return east, east * height / width
+
+    @property
     def radar_cells(self) -> int:
         """The number of cells of a scan of the radar: range cells in each beam."""
         return math.ceil(360 / self.radar_beam_deg - 1e-9) * math.ceil(self.radar_range_m / self.radar_resolution_m)

@@ -55,11 +55,9 @@ class CameraSensor(Sensor):
 
     def __init__(self, scenario: Scenario, survivors: Survivors, solids: Solids) -> None:
         config = scenario.sensors
-        width, height = config.camera_pixels
         self.period_ns = round(S / config.camera_hz)
-        self._tan_half_fov = math.tan(math.radians(config.camera_fov_deg) / 2)
-        self._tan_half_fov_height = self._tan_half_fov * height / width
-        self._width = width
+        self._tan_half_fov, self._tan_half_fov_height = config.tan_half_fov
+        self._width, _ = config.camera_pixels
         self._cycles = config.camera_cycles
         self._sigma_rad = math.radians(config.camera_sigma_deg)
         self._false_per_image = config.camera_false_per_hour / config.camera_hz / 3600
@@ -130,7 +128,7 @@ class ImageSensor(Sensor):
         from sim.world.sensors.scene import Scene
 
         self.period_ns = round(S / config.image_hz)
-        self._tan_half_fov = math.tan(math.radians(config.camera_fov_deg) / 2)
+        self._tan_half_fov, _ = config.tan_half_fov
         self._pixels = config.image_pixels
         self._carriers = frozenset(config.image_nodes or scenario.uav_ids)
         not_buried = survivors.places[~survivors.buried]

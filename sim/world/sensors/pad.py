@@ -28,11 +28,10 @@ class PadSensor(Sensor):
 
     def __init__(self, scenario: Scenario) -> None:
         config = scenario.sensors
-        width, height = config.camera_pixels
+        width, _ = config.camera_pixels
         self.period_ns = round(S / config.pad_hz)
         self._pads = np.array(positions(scenario), dtype=np.float64)
-        self._tan_east = math.tan(math.radians(config.camera_fov_deg) / 2)
-        self._tan_north = self._tan_east * height / width
+        self._tan_east, self._tan_north = config.tan_half_fov
         self._half_m = config.pad_marker_m / 2
         self._most_m = config.pad_marker_m * width / (2 * _LEAST_PIXELS * self._tan_east)
         self._sigma_rad = math.radians(config.camera_sigma_deg)

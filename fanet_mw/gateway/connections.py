@@ -71,7 +71,7 @@ class Connection:
         self._peers: dict[object, Any] = {}
         """What takes bytes for each ground station, the one that spoke last at the end."""
         self._close: list[Callable[[], None]] = []
-        """Of what is open."""
+        """The functions that close the servers, tasks and streams that are open."""
 
     async def open(self) -> None:
         """Raises BusError."""

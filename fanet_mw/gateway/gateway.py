@@ -134,9 +134,9 @@ class Gateway:
         self._heard: deque[tuple[str, bytes]] = deque()
         self._drain_asked = False
         self._counts: Counter[str] = Counter()
-        """What did not pass as far as it was told."""
+        """All counts when they were last told; only what has come since is told next."""
         self._own: Counter[str] = Counter()
-        """What did not even come to a link."""
+        """The taps that reached no link: lost here, or malformed."""
         self._loop: asyncio.AbstractEventLoop | None = None
 
     async def serve(self, over: asyncio.Event) -> None:

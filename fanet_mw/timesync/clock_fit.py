@@ -81,7 +81,7 @@ class Line(NamedTuple):
 
     def rate_error(self, oscillator: Oscillator) -> float:
         """The bound of the rate's error (parts), as the node states it to others."""
-        most = oscillator.rate + abs(self.rate)  # the true rate may be the greatest one on the other side
+        most = oscillator.rate + abs(self.rate)  # the true rate may be the greatest one of the other sign
         return min(most, self.stated_rate + _SIGMAS * self.rate_sd)
 
 
@@ -123,7 +123,7 @@ def fitted(pairs: list[Pair], oscillator: Oscillator) -> Line:
     effective = whole * whole / math.fsum(w * w for w in weights)
     rate_sd = slope_ns / math.sqrt(spread * effective) if spread > 0 else math.inf
     if _SIGMAS * rate_sd >= oscillator.rate:
-        rate = 0.0  # it might be off by the greatest rate on the other side, and 0 is off by one at most
+        rate = 0.0  # a rate of the wrong sign is off by up to twice the oscillator's greatest, 0 by once that
     middle_ns = at_ns + round(mean_x)
     return Line(
         at_ns=middle_ns,

@@ -113,7 +113,8 @@ class Confirmations:
         self._held: dict[int, list[Confirmed]] = {}
         """For each survivor, and each person without a phone, the confirmations that hold, in their order."""
         self._as_ns: dict[int, int] = {}
-        """Since when people without a phone were told as somebody who carries one, until that was taken back."""
+        """For each person without a phone who was first confirmed as a survivor with one: the instant of that
+        confirmation, which was refuted later."""
         self.reopened = 0
         """The number of times that a confirmation was taken back."""
 
@@ -129,8 +130,8 @@ class Confirmations:
                 self.reopened += not is_person(record.survivor)
 
     def _keep_as_persons(self, refuted: Refuted, *, since_ns: int) -> None:
-        """Whoever takes a confirmation back tells at the same instant that a person is there all the same. That person
-        was found when the confirmation was told.
+        """A UAV that refutes a confirmation tells at the same instant that a person without a phone is there. That
+        person counts as found since the refuted confirmation.
         """
         for number, finds in self._held.items():
             if is_person(number) and finds and finds[0].t_ns == refuted.t_ns and not left_by(refuted, finds):

@@ -41,7 +41,8 @@ In a single one the second may be a false alarm.
 _UNREPORTED_NS: Final = 4 * S
 """How long a person who is certainly there waits, near phones without an owner, before being reported without one."""
 _PLACED_NS: Final = 2 * S
-"""The same where no phone is heard: seen from farther aside, people are placed more exactly."""
+"""How long they wait where no such phone is near: the UAV sees them from another side meanwhile, which places them more
+exactly."""
 _SURE_M: Final = 3.5
 """The greatest standard deviation with which a person is reported without a phone."""
 _GATE: Final = 16.0

@@ -1,8 +1,9 @@
 """Decides that a survivor is inside a building: the phone is most probably there, and nobody lies around it.
 
 probability of a place   by the received powers, little of that where cameras have looked and seen nobody
-verdict                  buildings together are `_SURE` of that: the one of the map that is `_NAMED` of it, or the place
-                         at which there is one that the map lacks; after a while, where the buildings are together
+verdict                  buildings have `_SURE` of the probability: the one of the map that has `_NAMED` of it is named,
+                         else ground where the map lacks buildings, if that has as much
+after a while            the mean place in all buildings
 """
 
 import math

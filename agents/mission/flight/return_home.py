@@ -1,5 +1,5 @@
 """The return of a UAV whose battery runs low, that hears nobody any more, or whose search is over: it flies home above
-all UAVs that search, then lands straight down, on the marker of its own pad once its camera sees it.
+all UAVs that search, and lands straight down. Once its camera sees the marker of its own pad it sinks towards that.
 
 Whoever does not know its place gives it up as well: its flight controller holds it, and lands it after a while.
 
@@ -41,7 +41,7 @@ _TURN_S: Final = 14.0
 _LAND_M_S: Final = 1.5
 """The speed of the landing."""
 _SEEN_NS: Final = 1_500 * MS
-"""How long after it was last seen a UAV sinks towards its pad."""
+"""A UAV goes on towards its pad for this long after it last saw the marker."""
 _SEEN_GAIN: Final = 0.3
 """The weight of one sighting of the pad against the earlier ones."""
 _TOWARDS_PER_S: Final = 0.5
@@ -230,7 +230,9 @@ class ReturnHome:
         return self.lands
 
     def _towards_pad(self, now_ns: int) -> Course | None:
-        """The way down to the pad while its marker is seen; None: straight down, as it is not, or right below."""
+        """The velocity towards the pad while its marker is seen. None: the UAV sinks straight down, because the marker is
+        not seen, or is right below and near.
+        """
         if self._pad is None or self._touches_down or now_ns - self._pad_ns > _SEEN_NS:
             return None
         here = self._own_motion.position

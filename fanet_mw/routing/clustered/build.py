@@ -153,7 +153,7 @@ def _by_timetable(ground: _Ground) -> Clustered:
     port, scenario = ground.port, ground.port.scenario
     timetables = TimetablesInForce()
     ground.contention.turns_at = timetables.turns_at
-    # all that turns promise is that nobody else sends in them; where they promise nothing, a place is worth more
+    # without bounds that count on turns, a node that has a turn soon is worth more than turns that nobody disturbs
     ground.contention.membership_waits = scenario.rigid or scenario.measures_links
     ground.contention.most_jitter_ns = round(scenario.clusters.contention_ms * MS * _JITTER)
     parts = _role_parts(ground, takes_slot=False)

@@ -2,8 +2,8 @@
 
 Two nodes that fly straight on lose each other when their distance exceeds the range (link expiration time; Su, Lee and
 Gerla, 2001). Those that hardly recede, whose position is not known, or that a UAV keeps in reach, are taken to stay.
-A UAV that lets go of another one for a moment mostly holds it again at once, and far nodes would learn of both for
-seconds: such a link counts until it would end sooner than that is noticed.
+A UAV often lets go of a neighbor and holds it again at once, and news of both changes travel for seconds. For
+`_LET_GO_NS` their link must therefore last only as long as its end takes to be noticed.
 """
 
 from collections.abc import Iterator, Mapping

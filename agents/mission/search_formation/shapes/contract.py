@@ -36,8 +36,8 @@ _WIDE: Final = 0.9
 _LANES: Final = 1.35
 """The distance of two lanes is at most this multiple of the distance to the side at which a phone is received."""
 EDGE_M: Final = 25.0
-"""The distance from the edge at which lines, sectors' teams and rings of UAVs enough turn, as cameras see it; less in a
-small area."""
+"""Lines, teams of sectors, and rings with enough UAVs turn at this distance from the edge, because cameras see the edge
+from there. In a small area it is less."""
 FIRST_M: Final = 16.0
 """The distance of each line from the middle, or of a sector's team from the side where its sweep begins, at the
 beginning: far enough for two teams not to be in each other's way, and near enough to receive what lies behind them."""

@@ -1,7 +1,8 @@
 """When a frame that contends may start: after a random jitter; if turns are in force, only in a contention window.
 
-Floods of membership (joins, schedules) wait for windows only where bounds count on turns: when a leader is lost, all
-join anew within seconds, more than windows hold, and who is left out has no turns.
+Floods of membership (joins, schedules) wait for windows only where bounds count on turns. Elsewhere they start at any
+time: when a leader is lost, all nodes join anew within seconds, windows have no room for so many, and a node without a
+place has no turns.
 """
 
 from collections.abc import Callable

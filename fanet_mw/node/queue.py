@@ -125,8 +125,8 @@ class TxQueue:
             self._drop(DropReason.EXPIRED, packet, now_ns=now_ns)
 
     def _fresh_until_us(self, packet: Packet) -> int:
-        """The packet's origin time [swarm us], less the amount by which the lifetime of its class is shorter. It expires
-        one full lifetime after this instant.
+        """The packet's origin time [swarm us], less the amount by which the lifetime of its class is shorter. It
+        expires one full lifetime after this instant.
         """
         return packet.header.origin_us - self._sooner_us.get(packet.header.priority, 0)
 

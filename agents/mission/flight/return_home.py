@@ -230,8 +230,8 @@ class ReturnHome:
         return self.lands
 
     def _towards_pad(self, now_ns: int) -> Course | None:
-        """The velocity towards the pad while its marker is seen. None: the UAV sinks straight down, because the marker is
-        not seen, or is right below and near.
+        """The velocity towards the pad while its marker is seen. None: the UAV sinks straight down, because the marker
+        is not seen, or is right below and near.
         """
         if self._pad is None or self._touches_down or now_ns - self._pad_ns > _SEEN_NS:
             return None

@@ -160,8 +160,8 @@ class Bidding:
                 self._announce(self.survivor, now_ns)
 
     def _reconsider(self, survivor: int, now_ns: int) -> None:
-        """Give up the present survivor if the auction is lost and this UAV is not nearly there, it takes too long, or it
-        is not permitted any more; but for a lost auction the bid is withdrawn.
+        """Give up the present survivor if the auction is lost and this UAV is not nearly there, it takes too long, or
+        it is not permitted any more; but for a lost auction the bid is withdrawn.
         """
         arrived_ns, patience_ns = self._approach.arrived_ns.get(survivor), self._patience_ns
         place = self._survivors.by_id[survivor].place()

@@ -309,6 +309,19 @@ def test_what_was_asked_of_a_lost_flight_controller_it_is_told_once_it_is_heard_
     assert controller.mode is mode
 
 
+def test_a_pilot_may_break_off_the_landing_that_a_lost_flight_controller_was_told_of() -> None:
+    controller = Controller()
+    controller.run(9)
+    controller.silent = True
+    controller.run(4)
+    controller.want(SetpointKind.LAND)
+    controller.silent = False
+    controller.run(9)
+    controller.mode = Mode.HOLD
+    assert not commands(controller.run(3)), "it was told once"
+    assert controller.mode is Mode.HOLD
+
+
 def test_what_was_asked_while_a_pilot_flew_is_flown_once_the_guided_mode_is_back() -> None:
     controller = Controller()
     controller.run(6)

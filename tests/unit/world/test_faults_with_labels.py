@@ -42,3 +42,12 @@ def test_a_fault_ends_the_one_with_its_label_and_lasts_as_long_as_it_says_itself
     begun = [mishap for now_s in range(0, 6, step_s) for mishap in mishaps.due(now_s * S)]
     assert begun == [control for _, control in controls if isinstance(control, Mishap)]
     assert (mishaps.offset_m[0, 0], mishaps.silent[0]) == (off_m, silent)
+
+
+def test_a_fault_of_the_post_on_the_ground_ends_the_one_with_its_label_too(make_scenario: Any) -> None:
+    mishaps = Mishaps(make_scenario(**{"nodes.count": 3, "ground.at_m": (0.0, -150.0)}))
+    mishaps.add(gps(5.0, label="off"), 0)
+    mishaps.add(Cut("off", NodeId(4), 0), S)
+    for now_s, off_m in enumerate((5.0, 0.0)):
+        mishaps.due(now_s * S)
+        assert mishaps.offset_m[0, 0] == off_m

@@ -116,6 +116,20 @@ def test_a_uav_lands_on_its_pad_by_the_marker_although_its_receiver_errs_otherwi
     assert true.horizontal_to(HOME) < 0.5
 
 
+def test_right_over_its_pad_a_uav_sinks_by_the_marker_down_to_two_metres_and_then_straight(
+    make_scenario: MakeScenario,
+) -> None:
+    one = Alone(make_scenario)
+    one.back.end()
+    assert one.lands(0.0, 0.0)
+    for up_m, east_m, straight in ((20.0, 0.2, False), (2.1, 0.2, False), (1.9, 0.2, True), (1.5, 0.6, True)):
+        one.own.position = Enu(HOME.east + east_m, HOME.north, up_m)
+        one.back.on_pad(Enu(-east_m, 0.0, -up_m), 0)
+        assert one.back.land_if_there(S)
+        assert one.out.course is not None
+        assert one.out.course.land == straight
+
+
 def test_low_over_the_ground_beside_its_pad_a_uav_goes_there_first_and_lands_where_it_is_if_the_marker_is_hidden(
     make_scenario: MakeScenario,
 ) -> None:

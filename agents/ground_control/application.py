@@ -42,6 +42,8 @@ _NOTICE: Final = common.MAV_SEVERITY_NOTICE
 _LONGEST: Final = 900
 """Inner bytes of a packet over the air."""
 _SLOWEST_NS: Final = 60 * S
+_TRIES_NS: Final = 120 * S
+"""After so long without a refusal telemetry is sent twice as often, down to the interval that leaves the air room."""
 _WATCHED_NS: Final = 10 * S
 """Telemetry over the air ends when the gateway has not been heard for so long."""
 _OVER_AIR: Final = frozenset({
@@ -115,7 +117,9 @@ class GroundControl(Application):
         self._node, self._streams = node, streams
         self._post = scenario.post
         self.listens = _OVER_AIR if scenario.post is not None else ()
-        self._pace_ns = pace_of(scenario).interval_ns
+        self._least_pace_ns = self._pace_ns = pace_of(scenario).interval_ns
+        self._slowed_ns = 0
+        """The instant at which telemetry was last refused, or made faster since."""
         self._deadline_ns = scenario.routing.lifetime_ns(PRIORITY_BULK)
         self._over_air = False
         """True if the last question of an operator came over the air."""
@@ -174,7 +178,8 @@ class GroundControl(Application):
         self._take(message.data, now_ns)
 
     def on_status(self, status: Status, now_ns: int) -> None:
-        """The network cannot deliver telemetry so often."""
+        """The network cannot deliver telemetry so often now."""
+        self._slowed_ns = now_ns
         if status.interval_ns is not None:
             self._pace_ns = max(self._pace_ns, status.interval_ns)
         else:
@@ -278,6 +283,8 @@ class GroundControl(Application):
     def _report(self, now_ns: int) -> None:
         """Send telemetry over the air: heartbeat and position always, and the other streams in turn."""
         watched = self._watched_ns is not None and now_ns - self._watched_ns < _WATCHED_NS
+        if now_ns - self._slowed_ns >= _TRIES_NS:
+            self._slowed_ns, self._pace_ns = now_ns, max(self._least_pace_ns, self._pace_ns // 2)
         self._report_ns = now_ns + self._pace_ns if watched else None
         post = self._post
         if post is None or self._report_ns is None:

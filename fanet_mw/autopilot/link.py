@@ -97,7 +97,7 @@ class AutopilotLink:
         self._sent_ns, self._times = 0, 0
         self._wanted: Setpoint | None = None
         self._unsaid = False
-        """True while what the computer wants has not been asked for: the flight controller was lost, or left alone."""
+        """True while what the computer wants has not been asked for, because it could not be."""
         self._hold: Enu | None = None
         self._setpoint_ns = 0
         self._streamed = 0
@@ -143,9 +143,14 @@ class AutopilotLink:
             self.yielded, self._guided = True, False
             self._drop(lambda one: one.command != _STREAM)
             self.events.append(f"left the guided mode for {self.mode or message.custom_mode}: left alone")
-        if self._unsaid and self._wanted is not None and not self.yielded:
+        if self._unsaid and self._wanted is not None and self._can_be_asked(self._wanted):
             self._unsaid = False
             self._ask_for(self._wanted)
+
+    def _can_be_asked(self, wanted: Setpoint) -> bool:
+        """False while it is lost or left alone; before it knows its place it has no height to take off to."""
+        takes_off = wanted.kind is SetpointKind.TAKEOFF
+        return not self.yielded and not self.lost and not (takes_off and self.position is None)
 
     @property
     def _asked_to_leave(self) -> bool:
@@ -237,7 +242,7 @@ class AutopilotLink:
             self._hold = None
         if again:
             return
-        self._unsaid = self.yielded or self.lost
+        self._unsaid = not self._can_be_asked(setpoint)
         if not self._unsaid:
             self._ask_for(setpoint)
             self._setpoint_ns = min(self._setpoint_ns, now_ns)

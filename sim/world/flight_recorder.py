@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from fanet_mw.bus import codecs
-from fanet_mw.bus.messages import Message, Poses, Setpoint
+from fanet_mw.bus.messages import Battery, Message, Poses, Setpoint
 from fanet_mw.bus.topics import Topics, node_of
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.scenario import Scenario
@@ -28,10 +28,12 @@ class SwarmFlight(NamedTuple):
     velocities: Rows
     setpoints: Mapping[int, Setpoint]
     """The last setpoint of each node that has had one."""
+    charges: Mapping[int, float] = {}
+    """The charge that each node's sensor told last."""
 
 
 class FlightRecorder:
-    """Receives the poses and setpoints of a swarm, and keeps the newest."""
+    """Receives the poses, setpoints and charges of a swarm, and keeps the newest."""
 
     def __init__(
         self, scenario: Scenario, subscribe: Callable[[str, Callable[[str, bytes], None]], None], names: Topics
@@ -41,23 +43,25 @@ class FlightRecorder:
         self._lock = threading.Lock()  # the bus calls on threads of its own
         self._poses = b""
         self._setpoints: dict[int, bytes] = {}
+        self._batteries: dict[int, bytes] = {}
         subscribe(names.pose, self._hear_poses)
-        subscribe(names.all_setpoints, self._hear_setpoint)
+        subscribe(names.all_setpoints, lambda topic, payload: self._hear(self._setpoints, topic, payload))
+        subscribe(names.sensor("*", "battery"), lambda topic, payload: self._hear(self._batteries, topic, payload))
 
     def _hear_poses(self, _topic: str, payload: bytes) -> None:
         with self._lock:
             self._poses = payload
 
-    def _hear_setpoint(self, topic: str, payload: bytes) -> None:
+    def _hear(self, newest: dict[int, bytes], topic: str, payload: bytes) -> None:
         node = node_of(topic)
         if node in self._ids:
             with self._lock:
-                self._setpoints[node] = payload
+                newest[node] = payload
 
     def last(self) -> SwarmFlight | None:
         """The last known flight; None before the first poses, and if they do not belong to this swarm."""
         with self._lock:
-            poses, setpoints = self._poses, dict(self._setpoints)
+            poses, setpoints, batteries = self._poses, dict(self._setpoints), dict(self._batteries)
         heard = [message for message in _decoded(poses) if isinstance(message, Poses)]
         if not heard or list(heard[-1].ids) != self._all_ids or len(heard[-1].states) != 6 * len(self._all_ids):
             return None
@@ -69,7 +73,13 @@ class FlightRecorder:
             for message in _decoded(setpoints[node]):
                 if isinstance(message, Setpoint) and makes_sense(message):
                     sent[node] = message
-        return SwarmFlight(states[:, :3].copy(), states[:, 3:].copy(), sent)
+        charges = {
+            node: message.charge
+            for node in sorted(batteries)
+            for message in _decoded(batteries[node])
+            if isinstance(message, Battery) and 0.0 <= message.charge <= 1.0
+        }
+        return SwarmFlight(states[:, :3].copy(), states[:, 3:].copy(), sent, charges)
 
 
 def _decoded(payload: bytes) -> list[Message]:

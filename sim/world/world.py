@@ -138,6 +138,9 @@ class WorldActor(Actor):
             self._guidance.obey(node, sent, at=self._engine.positions()[node - 1], t_s=sent.t_ns / S)
         drained = scenario.sensors.battery_hz > 0 or scenario.world.engine == "rotors"
         self._drain = BatteryDrain(scenario) if drained else None
+        if self._drain is not None and flight is not None:
+            for node, charge in flight.charges.items():
+                self._drain.batteries.charge[node - 1] = charge
         survivors = Survivors(scenario, solids.ground_m)
         self._mishaps = Mishaps(scenario)
         gps = GpsReceiver(scenario, self._mishaps)

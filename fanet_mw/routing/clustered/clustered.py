@@ -169,8 +169,10 @@ class Clustered(RoutingProtocol):
     def on_status(self, status: TxStatus, *, now_ns: int) -> None:
         parts = self.parts
         missed = parts.one_way.failed(status)
-        if missed is not None:
+        if missed is not None and status.outcome is TxOutcome.RETRY_LIMIT:
             self._send_one_way(missed, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
+        elif missed is not None:
+            parts.floods.contend(missed, due_ns=now_ns, now_ns=now_ns)
         failed = parts.uplink.on_status(status)
         if failed is None:
             return

@@ -39,6 +39,7 @@ class Controller:
         self.said: list[Any] = []
         self.answers = True
         self.silent = False
+        self.knows_place = True
         self.result = 0
 
     def tell(self, message: Any) -> None:
@@ -51,7 +52,7 @@ class Controller:
             self.now_ns += 50 * MS
             if not self.silent and self.now_ns % S == 0:
                 self.beat()
-            if not self.silent and self.now_ns % (200 * MS) == 0:
+            if not self.silent and self.knows_place and self.now_ns % (200 * MS) == 0:
                 self.position()
             self.link.wake(self.now_ns)
             out, self.link.out = self.link.out, b""
@@ -191,6 +192,19 @@ def test_a_take_off_arms_first_and_counts_its_height_as_the_flavor_does(flavor: 
     take_off = [message for message in said if message.get_type() == "COMMAND_LONG"][-1]
     assert take_off.param7 == height_m
     assert math.isnan(take_off.param5)
+    assert controller.armed
+
+
+@pytest.mark.parametrize("flavor", [*Flavor])
+def test_a_take_off_that_is_wanted_before_the_first_position_is_asked_for_after_it(flavor: Flavor) -> None:
+    """PX4 was asked for 20 m above the sea, home being at 40 m, and never again."""
+    controller = Controller(flavor)
+    controller.knows_place = False
+    controller.want(SetpointKind.TAKEOFF, Enu(10.0, 20.0, 20.0))
+    assert not {22, 400} & set(commands(controller.run(8)))
+    controller.knows_place = True
+    take_off = [m for m in controller.run(4) if m.get_type() == "COMMAND_LONG" and m.command == 22]
+    assert [m.param7 for m in take_off] == [20.0 + AMSL_M * (flavor is Flavor.PX4)]
     assert controller.armed
 
 

@@ -10,7 +10,7 @@ import pytest
 from kit import slow
 
 from fanet_mw.bus import codecs
-from fanet_mw.bus.messages import Message, Poses, Setpoint, SetpointKind
+from fanet_mw.bus.messages import Battery, Message, Poses, Setpoint, SetpointKind
 from fanet_mw.bus.topics import Topics
 from fanet_mw.hosts.bus import OnSample
 from fanet_mw.scenario import Scenario
@@ -33,8 +33,8 @@ class Ear:
         self.say_bytes(topic, codecs.encode(messages))
 
     def say_bytes(self, topic: str, payload: bytes) -> None:
-        expression = NAMES.pose if topic == NAMES.pose else NAMES.all_setpoints
-        self._hears[expression](topic, payload)
+        expression = NAMES.sensor("*", "battery") if topic.endswith("/battery") else NAMES.all_setpoints
+        self._hears[NAMES.pose if topic == NAMES.pose else expression](topic, payload)
 
 
 @pytest.fixture(params=["kinematic", *slow("pybullet")])
@@ -115,3 +115,18 @@ def test_setpoints_that_make_no_sense_are_left_out(make_scenario: Any) -> None:
     flight = ear.recorder.last()
     assert isinstance(flight, SwarmFlight)
     assert list(flight.setpoints) == [2]
+
+
+def test_batteries_are_no_fuller_in_a_world_that_starts_again(make_scenario: Any) -> None:
+    scenario = make_scenario(**{"nodes.count": 4, "sensors.battery_hz": 1})
+    ear = Ear(scenario)
+    ear.say(NAMES.pose, good())
+    for node, charge in ((1, 0.9), (2, 0.3), (2, 0.25), (3, float("nan")), (4, 2.0)):
+        ear.say(NAMES.sensor(node, "battery"), Battery(0, 11.0, 5.0, charge))
+    world = WorldActor(scenario, "flight", flight=ear.recorder.last())
+    world.start(10 * S)
+    while (wake_ns := world.next_wake_ns()) is not None and wake_ns <= 11 * S:
+        world.wake(wake_ns)
+    told = {topic: message.charge for topic, message in world.outbox if isinstance(message, Battery)}
+    charges = [told[NAMES.sensor(node, "battery")] for node in (1, 2, 3, 4)]
+    assert charges == pytest.approx([0.9, 0.25, 1.0, 1.0], abs=0.01)

@@ -105,6 +105,8 @@ class OneWay:
         attempt = self._under_way.pop(status.seq, None)
         if attempt is None or status.outcome is TxOutcome.ACKED:
             return None
+        if status.outcome is not TxOutcome.RETRY_LIMIT:
+            return attempt.packet  # it did not leave this radio, which says nothing of the next hop
         self._neighbors.forget(attempt.hop)
         receiver = NodeId(attempt.packet.header.destination)
         way = self._ways.get(receiver)

@@ -43,6 +43,8 @@ class Bench:
         self.heard: list[Any] = []
         """All that was put on the tap, decoded."""
         self.numbers: list[int] = []
+        self.reports_ns: list[int] = []
+        """The instants at which it sent something over the air."""
         self.streams = TelemetryStreams(NODE, position=at, telemetry_hz=0)
         self.control = GroundControl(self.scenario, NODE, self.streams, position=at)
         self.control.start(self, 0)  # type: ignore[arg-type]
@@ -56,6 +58,10 @@ class Bench:
         decoded = mavlink.decode(frames)
         self.heard += decoded
         self.numbers += [message.get_seq() for message in decoded]
+
+    def send(self, content: bytes, **_: object) -> int:
+        self.reports_ns.append(self.now_ns)
+        return len(self.reports_ns)
 
     # --- what is done ---------------------------------------------------------------------------------------------
 

@@ -7,7 +7,7 @@ import pytest
 from operator_bench import GCS, LAT, LON, Bench, degrees, scenario
 
 from fanet_mw import mavlink
-from fanet_mw.application import Course
+from fanet_mw.application import Course, Fate, Received, Status
 from fanet_mw.flavors import Mode, number_of
 from fanet_mw.mavlink import Geodetic, common
 from fanet_mw.units import Enu, S
@@ -653,3 +653,27 @@ def test_what_is_for_another_system_or_component_is_not_answered() -> None:
     assert not bench.say(common.MAVLink_command_long_message(2, 1, ARM, 0, 1, 0, 0, 0, 0, 0, 0))
     assert not bench.say(common.MAVLink_command_long_message(1, 100, ARM, 0, 1, 0, 0, 0, 0, 0, 0))
     assert not bench.flown.armed
+
+
+@pytest.mark.parametrize("least_ns", [None, 20 * S])
+def test_telemetry_that_the_network_refused_is_as_frequent_again_once_it_is_taken(least_ns: int | None) -> None:
+    bench = Bench(scenario(ground={"at_m": [0, 0]}))
+    control, post = bench.control, bench.scenario.post
+    assert post is not None
+    heartbeat = bytes(common.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(common.MAVLink(None, *GCS)))
+
+    def intervals_s(seconds: int) -> list[float]:
+        before = len(bench.reports_ns)
+        for _ in range(seconds):
+            control.on_message(
+                Received(post, bench.node, 1, bench.now_ns, 1, heartbeat, content=heartbeat), bench.now_ns
+            )
+            bench.run(1, heartbeats=False)
+        return [(later - at) / S for at, later in pairwise(bench.reports_ns[before:])]
+
+    usual_s = intervals_s(30)[-1]
+    for _ in range(4):
+        status = Status(1, Fate.REFUSED, bench.now_ns, interval_ns=least_ns)
+        control.on_status(status, bench.now_ns)
+    assert intervals_s(100)[-1] >= 16 * usual_s
+    assert intervals_s(700)[-1] == usual_s

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import pickle
 from collections.abc import Sequence
 
 import pytest
@@ -67,6 +68,20 @@ def test_a_straight_way_is_clear_if_nothing_is_on_any_part_of_it(east_m: float) 
     there = cell_of(east_m, 0.0)
     assert not is_clear((0.0, 0.0), (100.0, 0.0), lambda cell: cell == there)
     assert is_clear((0.0, 12.0), (100.0, 12.0), lambda cell: cell == there)
+
+
+def test_echoes_that_have_faded_are_forgotten() -> None:
+    """After an hour of false echoes all over the area each fix looked at thousands of them."""
+    obstacles = KnownObstacles(NO_MAP)
+
+    def grown_by(scans: range) -> int:
+        for second in scans:
+            at, echo = Enu(12.0 * second, 0.0, 60.0), Echo(30.0, 1.0, 0.0, 0.0, 20.0)
+            obstacles.radar([echo], at=at, velocity=STILL, neighbors=(), now_ns=second * S)
+        return len(pickle.dumps(obstacles))
+
+    first = grown_by(range(20))
+    assert grown_by(range(20, 400)) < 1.5 * first
 
 
 def test_a_tower_on_the_map_is_flown_around() -> None:

@@ -1,18 +1,20 @@
 """A packet for one node goes hop by hop along the way back of its floods; without a way it is flooded."""
 
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 
 from fanet_mw.bus.messages import TxOutcome, TxStatus
-from fanet_mw.node.contract import Port
+from fanet_mw.node.contract import Port, RoutingProtocol
 from fanet_mw.node.neighbors import Neighbor, Neighbors
 from fanet_mw.node.node import Node
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing import make_protocol
+from fanet_mw.routing.clustered.clustered import Clustered
 from fanet_mw.routing.clustered.forwarding.one_way import OneWay, is_receipt
 from fanet_mw.scenario import Scenario
-from fanet_mw.units import Enu, NodeId, S
+from fanet_mw.units import BROADCAST, Enu, NodeId, S
 from fanet_mw.wire import FLAG_FLOOD, Header, Kind
 from fanet_mw.wire.application_message import DELIVERED, Receipt, encode_receipts
 from fanet_mw.wire.hello.beacon import Beacon, Role
@@ -84,11 +86,10 @@ def test_a_packet_does_not_go_back_to_where_it_came_from(station: Station) -> No
     assert not station.one_way.send(came, start_ns=2 * S, now_ns=2 * S)
 
 
-@pytest.mark.parametrize("outcome", [TxOutcome.RETRY_LIMIT, TxOutcome.QUEUE_FULL, TxOutcome.LATE])
-def test_a_hop_that_does_not_answer_is_none_until_it_is_heard_again(station: Station, outcome: TxOutcome) -> None:
+def test_a_hop_that_does_not_answer_is_none_until_it_is_heard_again(station: Station) -> None:
     assert station.send(NEAR) == [NEAR]
     assert station.end(TxOutcome.RETRY_LIMIT, request=7) is None, "a request of others"
-    missed = station.end(outcome)
+    missed = station.end(TxOutcome.RETRY_LIMIT)
     assert missed is not None
     assert missed.header.destination == NEAR
     assert station.send(NEAR) == []
@@ -97,9 +98,40 @@ def test_a_hop_that_does_not_answer_is_none_until_it_is_heard_again(station: Sta
     assert station.end(TxOutcome.ACKED, request=1) is None
     station.flood(FAR, OTHER, born_us=7)
     assert station.send(FAR) == [OTHER]
-    assert station.end(outcome, request=2) is not None
+    assert station.end(TxOutcome.RETRY_LIMIT, request=2) is not None
     assert station.send(FAR) == []
     assert not len(station.one_way)
+
+
+@pytest.mark.parametrize("outcome", [TxOutcome.QUEUE_FULL, TxOutcome.LIFETIME, TxOutcome.LATE, TxOutcome.REFUSED])
+def test_what_the_own_radio_did_not_let_out_says_nothing_of_the_way(station: Station, outcome: TxOutcome) -> None:
+    """An overloaded node forgot its ways, and flooded what had a way: one frame became one of each node."""
+    station.flood(FAR, OTHER, born_us=7)
+    for request, (receiver, hop) in ((0, (NEAR, NEAR)), (2, (FAR, OTHER))):
+        assert station.send(receiver) == [hop]
+        assert station.end(outcome, request=request) is not None
+        assert station.send(receiver) == [hop]
+
+
+@pytest.mark.parametrize("outcome", [TxOutcome.RETRY_LIMIT, TxOutcome.QUEUE_FULL, TxOutcome.REFUSED])
+def test_what_did_not_reach_the_next_hop_is_flooded_from_here(make_scenario: MakeScenario, outcome: TxOutcome) -> None:
+    made: list[Clustered] = []
+
+    def make(*parts: Any) -> RoutingProtocol:
+        protocol = make_protocol(*parts)
+        assert isinstance(protocol, Clustered)
+        made.append(protocol)
+        return protocol
+
+    node = Node(OURS, make_scenario(**{"nodes.count": 5}), make, position=Enu(0.0, 0.0, 50.0))
+    (protocol,) = made
+    protocol.parts.one_way.learn(Header(7, 1, FAR, 0xFFFF, OTHER, int(Kind.JOIN), 8, 1, 0, FLAG_FLOOD), OTHER)
+    packet = node.port.announce(Kind.DATA, b"", now_ns=S, flags=0, hop_limit=8, destination=FAR)
+    protocol.originate(packet, due_ns=S, now_ns=S)
+    (request,) = node.requests
+    assert request.dst == OTHER
+    node.on_status(TxStatus(request.seq, outcome, S, 1), now_ns=2 * S)
+    assert [request.dst for request in node.requests[1:]] == [BROADCAST]
 
 
 def test_who_hears_its_own_packets_flooded_over_others_shows_the_way_once_a_second(station: Station) -> None:

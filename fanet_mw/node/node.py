@@ -15,7 +15,7 @@ from fanet_mw import wire
 from fanet_mw.bus.messages import Reception, TxStatus
 from fanet_mw.errors import DropReason, LocalProtocolError, MalformedFrameError
 from fanet_mw.node.contract import Port, RoutingProtocol
-from fanet_mw.node.duplicates import DELIVERED, DuplicateSet
+from fanet_mw.node.duplicates import DELIVERED, DuplicateSet, key_of
 from fanet_mw.node.header_check import HeaderCheck
 from fanet_mw.node.neighbors import Silences
 from fanet_mw.node.packet import Packet, Relay
@@ -30,8 +30,12 @@ from fanet_mw.wire import Kind
 
 _DATA: Final = int(Kind.DATA)
 _HELLO: Final = int(Kind.HELLO)
+_SEQ: Final = 3
+"""The index of the packet's sequence number in `wire.Fields`."""
+_ORIGIN: Final = 4
+"""The index of its origin there."""
 _PREV_HOP: Final = 6
-"""The index of the transmitter in `wire.Fields`: another station's copy says nothing about who has the packet."""
+"""The index of the transmitter there: another station's copy says nothing about who has the packet."""
 _NONE: Final[Sequence[Relay]] = ()
 _LEADERLESS: Final = {"state": "leaderless", "leader": 0, "term": 0, "epoch": 0}
 """What a node reports of a leader unless its protocol has one, so that one program reads the reports of all."""
@@ -214,8 +218,9 @@ class Node:
             known = handled.old.get(packet_hash, 0)
         if known & phase:
             self._copies += 1
-            if self._on_copy is not None and seen.fields[_PREV_HOP] == reception.src:
-                self._on_copy(seen.key, reception.src, now_ns=now_ns)
+            fields = seen.fields
+            if self._on_copy is not None and fields[_PREV_HOP] == reception.src:
+                self._on_copy(key_of(fields[_ORIGIN], fields[_SEQ]), reception.src, now_ns=now_ns)
             return True
         self._others += 1
         for relay in self._first_copy(seen, reception, known, now_ns):
@@ -239,8 +244,9 @@ class Node:
                 relays.append(self._first_copy(part, reception, known, now_ns))
                 continue
             self.port.dropped[DropReason.DUPLICATE] += 1
-            if on_copy is not None and part.fields[_PREV_HOP] == reception.src:
-                on_copy(part.key, reception.src, now_ns=now_ns)
+            fields = part.fields
+            if on_copy is not None and fields[_PREV_HOP] == reception.src:
+                on_copy(key_of(fields[_ORIGIN], fields[_SEQ]), reception.src, now_ns=now_ns)
         if any(relays):
             for together in zip_longest(*relays):
                 self.port.relay_together([relay for relay in together if relay is not None])

@@ -12,7 +12,7 @@ from typing import Final, Protocol, TypeVar
 from fanet_mw import mavlink
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.motion import Motion
-from fanet_mw.node.duplicates import PHASES, hash_of, key_of
+from fanet_mw.node.duplicates import PHASES, hash_of
 from fanet_mw.node.packet import Packet
 from fanet_mw.units import MS, NodeId, S
 from fanet_mw.wire import (
@@ -31,12 +31,8 @@ from fanet_mw.wire import (
 
 _new: Final = tuple.__new__  # faster than the constructor, for objects that are made once per frame
 _HELLO: Final = int(Kind.HELLO)
-_SEQ: Final = 3
-"""The index of the packet's sequence number among the fields of a header (`wire.Fields`)."""
-_ORIGIN: Final = 4
-"""The index of its origin among them."""
 _KIND: Final = 7
-"""The index of its kind among them."""
+"""The index of the packet's kind among the fields of a header (`wire.Fields`)."""
 _FLAGS: Final = 11
 """The index of its flags among them."""
 BUNDLE: Final = 1 << 30
@@ -70,11 +66,6 @@ class Looked:
         """The packet in the frame; None until `read` has been called."""
         self.parts: Sequence[Looked] | None = None
         """The packets of a frame that holds several; None until `Reader.parts` has been asked."""
-
-    @property
-    def key(self) -> int:
-        """Origin and sequence number as one number (`duplicates.key_of`); 0 if the frame holds none, or several."""
-        return 0 if self.phase == BUNDLE else key_of(self.fields[_ORIGIN], self.fields[_SEQ])
 
     def read(self, cached: bool = True) -> Packet:
         """The packet; raises MalformedFrameError. `cached`: a hello, which the clock has asked for already."""

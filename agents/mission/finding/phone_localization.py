@@ -19,9 +19,9 @@ common to all phones; a recognized owner's position replaces the estimate.
 import math
 from array import array
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import lru_cache, reduce
+from functools import lru_cache
 from itertools import compress
-from operator import add, and_, mul, sub
+from operator import add, mul, sub
 from typing import Final, NamedTuple
 
 from fanet_mw.units import Enu
@@ -34,8 +34,9 @@ _HALF_CELLS: Final = 18
 the strongest received power: a phone is first received from up to 400 m, where shadowing is kind."""
 _WIDTH: Final = 2 * _HALF_CELLS + 1
 _EVERY_CELL: Final = (True,) * (_WIDTH * _WIDTH)
-_COLUMNS: Final = tuple(float(cell % _WIDTH) for cell in range(_WIDTH * _WIDTH))
-_ROWS: Final = tuple(float(cell // _WIDTH) for cell in range(_WIDTH * _WIDTH))
+_NUMBERS: Final = tuple(map(float, range(_WIDTH)))
+"""The number of each column, or row, of cells."""
+_SQUARES: Final = tuple(number * number for number in _NUMBERS)
 _OFF_CENTER_M: Final = 120.0
 """A new grid is made when the strongest power was received farther than this from the middle of the present one."""
 _CORRELATION_M: Final = 50.0
@@ -313,24 +314,23 @@ class PhoneFilter:
         possible = _inside(self._middle, model.half_m + CELL_M / 2)
         self._best = best = max(compress(scores, possible))
         exp, least = math.exp, best - 40.0
-        likely = [score >= least for score in scores]
+        weights = [exp(0.5 * (score - best)) if score >= least else 0.0 for score in scores]
         if possible is not _EVERY_CELL:
-            likely = list(map(and_, likely, possible))
-        weights = [exp(0.5 * (score - best)) for score in compress(scores, likely)]
-        columns, rows = list(compress(_COLUMNS, likely)), list(compress(_ROWS, likely))
-        by_column, by_row = list(map(mul, weights, columns)), list(map(mul, weights, rows))
-        total = _sum(weights)
-        mean_i, mean_j = _sum(by_column) / total, _sum(by_row) / total
-        ii, ij = _sum(map(mul, by_column, columns)), _sum(map(mul, by_column, rows))
-        jj = _sum(map(mul, by_row, rows))
+            weights = list(map(mul, weights, possible))
+        rows = [weights[first : first + _WIDTH] for first in range(0, len(weights), _WIDTH)]
+        by_column, by_row = list(map(math.fsum, zip(*rows, strict=True))), list(map(math.fsum, rows))
+        total = math.fsum(by_row)
+        mean_i, mean_j = _product(by_column, _NUMBERS) / total, _product(by_row, _NUMBERS) / total
+        ii, jj = _product(by_column, _SQUARES) / total, _product(by_row, _SQUARES) / total
+        ij = _product([_product(row, _NUMBERS) for row in rows], _NUMBERS) / total
         cell2 = CELL_M * CELL_M
         quantized = 1 / 12
         return Estimate(
             self._middle.east + (mean_i - _HALF_CELLS) * CELL_M,
             self._middle.north + (mean_j - _HALF_CELLS) * CELL_M,
-            (max(0.0, ii / total - mean_i * mean_i) + quantized) * cell2,
-            (ij / total - mean_i * mean_j) * cell2,
-            (max(0.0, jj / total - mean_j * mean_j) + quantized) * cell2,
+            (max(0.0, ii - mean_i * mean_i) + quantized) * cell2,
+            (ij - mean_i * mean_j) * cell2,
+            (max(0.0, jj - mean_j * mean_j) + quantized) * cell2,
         )
 
 
@@ -387,9 +387,9 @@ def _ground_m(a: Enu, b: Enu) -> float:
     return math.hypot(a.east - b.east, a.north - b.north)
 
 
-def _sum(values: Iterable[float]) -> float:
-    """The sum, added from the first to the last; `sum` adds in another manner from Python 3.12 on."""
-    return reduce(add, values, 0.0)
+def _product(values: Iterable[float], factors: Iterable[float]) -> float:
+    """The sum of the values, each times its factor."""
+    return math.fsum(map(mul, values, factors))
 
 
 def _news(position: Enu, silent_at: Iterable[Enu]) -> float:

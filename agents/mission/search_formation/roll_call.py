@@ -109,10 +109,12 @@ class RollCall:
         self._falls = falls
         heard, neighbor_ns, begun = self._heard, self._neighbor_ns, since_ns // ROLL_NS
         least_ns = min(self._silent_ns, _AWAY_NS)
+        last_roll = -(-now_ns // ROLL_NS) - 1
         for node in plan.nodes:
-            silent_ns = now_ns - heard.get(node, begun) * ROLL_NS
-            if silent_ns <= ROLL_NS or node in self.lost or node in (0, self._node):
+            heard_at = heard.get(node, begun)
+            if heard_at >= last_roll or node in self.lost or node in (0, self._node):
                 continue  # it was heard since the last roll, or is nobody to miss
+            silent_ns = now_ns - heard_at * ROLL_NS
             near, gone = now_ns - neighbor_ns.get(node, -_NEIGHBOR_NS) < _NEIGHBOR_NS, False
             if near and self._silent is not None:
                 by_others = heard.get(node, 0) > neighbor_ns[node] // ROLL_NS + 1

@@ -65,11 +65,12 @@ class BulkAdmission:
         kept_ns = _LATELY_NS if self._deadline_ns is None else _SHARED_NS
         while self._arrived[0][0] < now_ns - kept_ns:
             self._arrived.popleft()
-        delays_ns = sorted(delay_ns for t_ns, _, delay_ns in self._arrived if delay_ns and t_ns >= now_ns - _LATELY_NS)
-        most_ns = delays_ns[int(_MOST * len(delays_ns))] if len(delays_ns) >= _FEWEST else 0
+        from_ns = now_ns - _LATELY_NS
+        delays_ns = [delay_ns for t_ns, _, delay_ns in self._arrived if delay_ns and t_ns >= from_ns]
         self._lately_ns.append(sum(delays_ns) // max(1, len(delays_ns)))
         if self._deadline_ns is None:
             return
+        most_ns = sorted(delays_ns)[int(_MOST * len(delays_ns))] if len(delays_ns) >= _FEWEST else 0
         if most_ns > self._deadline_ns // 2:
             sources = len({origin for _, origin, _ in self._arrived})
             passed_ns = max(now_ns - self._arrived[0][0], _EACH_NS)

@@ -6,6 +6,7 @@ networks", MobiCom 2001). A node with little to send takes part in a few slots o
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Final
 
 from fanet_mw.routing.rounds.round_timing import RoundTiming
@@ -14,8 +15,11 @@ SELDOM: Final = 8
 """A node with little to send takes part in one of so many slots."""
 _MOST_SEARCHED: Final = 4096
 _MASK: Final = 0xFFFFFFFF
+_REMEMBERED: Final = 1 << 14
+"""The bids that a process remembers: those of 100 nodes for 160 slots, as each node asks for those of its rivals."""
 
 
+@lru_cache(maxsize=_REMEMBERED)
 def _bid(node: int, slot: int) -> int:
     """What a node bids for a slot: the highest bid wins it."""
     mixed = (node * 0x9E3779B1 + slot * 0x85EBCA77) & _MASK

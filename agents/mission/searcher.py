@@ -177,6 +177,7 @@ class Searcher:
         self._flight = Flight(
             own_motion, place, goal, velocity_choice, connectivity,
             roll_call=roll_call, take_off=take_off, return_home=self._return_home,
+            height_m=nodes.altitude_m, ceiling_m=mission.ceiling_m,
         )  # fmt: skip
         self._last_mode: tuple[str, int] | None = None
         """The mode that was recorded last, and the survivor to whom the UAV flew then."""

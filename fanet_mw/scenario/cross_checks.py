@@ -79,6 +79,7 @@ def disagreements(scenario: Scenario) -> Sequence[str]:
     found += _deaf_search(scenario)
     found += _impossible_formation(scenario)
     found += _motionless_search(scenario)
+    found += _too_high_search(scenario)
     found += _unasked_return(scenario)
     found += _never_taking_off(scenario)
     found += _impossible_faults(scenario)
@@ -230,6 +231,12 @@ def _impossible_formation(scenario: Scenario) -> Iterator[str]:
         yield f'{wanted} routing.protocol = "clustered", which makes clusters'
     if scenario.clusters.count > _MOST_CLUSTERS_ABREAST:
         yield f"{wanted} clusters.count = {scenario.clusters.count} <= {_MOST_CLUSTERS_ABREAST}"
+
+
+def _too_high_search(scenario: Scenario) -> Iterator[str]:
+    mission, altitude_m = scenario.mission, scenario.nodes.altitude_m
+    if mission.search != "none" and altitude_m > mission.ceiling_m:
+        yield f"nodes.altitude_m = {altitude_m:g} must be <= mission.ceiling_m = {mission.ceiling_m:g}"
 
 
 def _motionless_search(scenario: Scenario) -> Iterator[str]:

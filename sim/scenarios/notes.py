@@ -25,13 +25,16 @@ _WORDS: Final = re.compile(r"`(\w+)`")
 _OFF: Final = ("none", "", False, None)
 _BETWEEN_BANDS_MHZ: Final = 3700.0
 _CLUSTERED: Final = frozenset({"clustered"})
+_LEVEL_M: Final = 3.0
+"""The least distance of the heights of UAVs that cannot know of each other."""
 _SIGMAS: Final = 2.0
 """The error of one receiver beside another, in standard deviations, for which pads should leave room."""
 
 
 def notes(scenario: Scenario) -> list[str]:
     kinds = (
-        _after_the_end, _without_effect, _without_place, _still_waves, _beyond_the_vehicle, _close_pads, _odd_band,
+        _after_the_end, _without_effect, _without_place, _still_waves, _beyond_the_vehicle, _close_pads, _low_ceiling,
+        _odd_band,
         _guessed,
     )  # fmt: skip
     return [note for kind in kinds for note in kind(scenario)]
@@ -156,6 +159,29 @@ def _close_pads(scenario: Scenario) -> Iterator[str]:
         yield (
             f"nodes.spacing_m = {nodes.spacing_m:g}: pads nearer to each other than {least_m:.1f} m; UAVs that come "
             "home by such receivers may land on each other"
+        )
+
+
+def _low_ceiling(scenario: Scenario) -> Iterator[str]:
+    """A ceiling that leaves UAVs which cannot know of each other no heights of their own."""
+    mission, mobility, altitude_m = scenario.mission, scenario.mobility, scenario.nodes.altitude_m
+    if mission.search == "none":
+        return
+    from agents.mission.flight.flight import CEILING_MARGIN_M
+    from agents.mission.flight.return_home import HOME_HIGHER_M
+    from agents.mission.search_formation.roll_call import MUTE_LEVELS
+
+    least_m = altitude_m + HOME_HIGHER_M + MUTE_LEVELS * _LEVEL_M + CEILING_MARGIN_M
+    if mission.ceiling_m < least_m:
+        yield (
+            f"mission.ceiling_m = {mission.ceiling_m:g}: UAVs that nobody hears need heights {_LEVEL_M:g} m apart "
+            f"above those who fly home; over nodes.altitude_m = {altitude_m:g} that needs {least_m:g} m"
+        )
+    highest_m = mobility.return_height_m + (scenario.nodes.count - 1) * mobility.return_step_m
+    if (mobility.return_after_s or mobility.geofence == "return") and highest_m > mission.ceiling_m:
+        yield (
+            f"mobility.return_height_m = {mobility.return_height_m:g}, return_step_m = {mobility.return_step_m:g}: UAV "
+            f"{scenario.nodes.count} returns at {highest_m:g} m, above mission.ceiling_m = {mission.ceiling_m:g}"
         )
 
 

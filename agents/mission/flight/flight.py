@@ -5,18 +5,19 @@ from typing import Final
 
 from agents.mission.flight.connectivity_maintenance import ConnectivityMaintenance
 from agents.mission.flight.goal import Goal
-from agents.mission.flight.return_home import ReturnHome
+from agents.mission.flight.return_home import HOME_HIGHER_M, ReturnHome
 from agents.mission.flight.take_off import TakeOff
 from agents.mission.flight.velocity_choice import VelocityChoice
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.search_formation.formation_place import FormationPlace
-from agents.mission.search_formation.roll_call import RollCall
+from agents.mission.search_formation.roll_call import MUTE_LEVELS, RollCall
 from fanet_mw.units import STILL, Enu, NodeId
 
-_MUTE_M: Final = 18.0
 _MUTE_LEVEL_M: Final = 8.0
-"""A mute UAV keeps its place so far above it, and its level times this: others fly where it should be, because they
-take it for lost. So it is above those who fly home, and two levels are not in each other's way."""
+"""A mute UAV keeps its place above those who fly home, its level times this or as much as the ceiling leaves: others
+fly where it should be, because they take it for lost, and two levels should not be in each other's way."""
+CEILING_MARGIN_M: Final = 4.0
+"""Goals end so far below the ceiling: heights are wrong by 2 m (rescue, seed 1: 122.2 m where 120 was wanted)."""
 _PASS_M: Final = 18.0
 """UAVs that give way to another part of the swarm fly so much higher: between the places of others and who is mute."""
 
@@ -35,8 +36,12 @@ class Flight:
         roll_call: RollCall,
         take_off: TakeOff | None,
         return_home: ReturnHome,
+        height_m: float,
+        ceiling_m: float,
     ) -> None:
-        """`take_off`: None for a UAV that is in the air from the start."""
+        """`take_off`: None for a UAV that is in the air from the start. `height_m`: of the lanes above ground."""
+        self._highest_m, self._home_m = max(height_m, ceiling_m - CEILING_MARGIN_M), height_m + HOME_HIGHER_M
+        self._level_m = min(_MUTE_LEVEL_M, max(0.0, self._highest_m - self._home_m) / MUTE_LEVELS)
         self._own_motion, self._place, self._goal = own_motion, place, goal
         self._velocity_choice, self._connectivity = velocity_choice, connectivity
         self._roll_call, self._take_off, self._return_home = roll_call, take_off, return_home
@@ -61,15 +66,19 @@ class Flight:
                 goal, feed = beyond.position._replace(up=goal.up), beyond.velocity
             level = self._roll_call.mute_level(now_ns)
             if level:
-                goal = goal._replace(up=goal.up + _MUTE_M + level * _MUTE_LEVEL_M)
+                goal = goal._replace(up=self._home_m + level * self._level_m)
             elif self._place.passes_above:
                 goal = goal._replace(up=goal.up + _PASS_M)
-            self.velocity = self._velocity_choice.velocity(goal, feed, now_ns, hastily=hastily)
+            self.velocity = self._velocity_choice.velocity(self._below(goal), feed, now_ns, hastily=hastily)
             self.held = self._connectivity.held(self.velocity)
         elif self._return_home.land_if_there(now_ns):
             self.velocity = None
         else:
-            self.velocity = self._velocity_choice.velocity(self._return_home.goal(now_ns), STILL, now_ns)
+            self.velocity = self._velocity_choice.velocity(self._below(self._return_home.goal(now_ns)), STILL, now_ns)
+
+    def _below(self, goal: Enu) -> Enu:
+        """A goal below the ceiling."""
+        return goal._replace(up=min(goal.up, self._highest_m))
 
     @property
     def takes_off(self) -> bool:

@@ -21,7 +21,7 @@ from fanet_mw.application import Course
 from fanet_mw.scenario.tables.world import NO_AID_S
 from fanet_mw.units import MS, Enu, NodeId, S
 
-_HIGHER_M: Final = 18.0
+HOME_HIGHER_M: Final = 18.0
 """A UAV flies home this far above the lanes; relays and followers fly below it."""
 LANDS_WITHIN_M: Final = 1.5
 """The UAV lands once it is within this horizontal distance of its base, and nearly stands."""
@@ -92,7 +92,7 @@ class ReturnHome:
         """`height_m`: of the lanes above ground. `beside`: the UAVs whose pads are beside its own."""
         self._no_fix_ns = max(_NO_FIX_NS, round(_NO_FIXES * S / fixes_hz))
         self._node, self._neighbors, self._beside = node, neighbors, beside
-        self._home = home._replace(up=height_m + _HIGHER_M)
+        self._home = home._replace(up=height_m + HOME_HIGHER_M)
         self._own_motion, self._outbox = own_motion, outbox
         self._endurance = Endurance(home, speed_m_s=speed_m_s, reserve=limits.reserve, airspeed_m_s=airspeed_m_s)
         self._limits = limits

@@ -33,7 +33,7 @@ _MUTE_NS: Final = 5 * S
 """So long a UAV must hear that it is lost until it takes its own radio for mute; wrong news is taken back by its next
 hello.
 """
-_LEVELS: Final = 7
+MUTE_LEVELS: Final = 7
 """Places that are closer than this in the plan have different levels; more levels would be too high to hear others."""
 _AHEAD: Final = 2
 """An instant this many units ahead of the own clock is not believed."""
@@ -84,7 +84,7 @@ class RollCall:
         if not lost:
             self._called_lost_ns = None
         elif self._called_lost_ns is None:
-            self._called_lost_ns, self._mute_level = now_ns, 1 + place % _LEVELS
+            self._called_lost_ns, self._mute_level = now_ns, 1 + place % MUTE_LEVELS
 
     def mute_level(self, now_ns: int) -> int:
         """0 while others hear this UAV, otherwise a level from 1 on by its place: mute UAVs do not know of each other,

@@ -77,6 +77,9 @@ class Mission(Section):
     """`search`: a UAV that has received no hello and no message of the search for this long flies home and lands; if it
     hears somebody again before it lands, it takes part again. 0: it searches on, however long it hears nobody. Needs
     hellos."""
+    ceiling_m: Annotated[float, Field(ge=5, le=1000)] = 120.0
+    """`search`: the height above ground beyond which no UAV flies: what open-category rules of the EU allow (the USA:
+    400 ft). Followers, UAVs that fly home, and those that nobody hears fly above `nodes.altitude_m`, within it."""
     sweeps: Annotated[int, Field(ge=0, le=1000)] = 0
     """`search`: after the area was swept this often, UAVs fly home and land as soon as no survivor is sought any more,
     at the latest after one more sweep. 0: they search until their batteries take them home."""

@@ -114,6 +114,13 @@ def test_a_search_by_uavs_that_do_not_fly_is_refused() -> None:
         catalog.find("rescue", ["mobility.speed_m_s=0"])
 
 
+def test_a_search_above_its_ceiling_is_refused() -> None:
+    assert catalog.find("rescue", ["nodes.altitude_m=120"]).mission.ceiling_m == 120
+    with pytest.raises(ConfigError, match=r"nodes.altitude_m = 121 must be <= mission.ceiling_m = 120"):
+        catalog.find("rescue", ["nodes.altitude_m=121"])
+    catalog.find("rescue", ["nodes.altitude_m=121", "mission.search=none"])
+
+
 def test_a_search_in_lines_by_too_few_uavs_is_refused_with_the_number_that_it_needs() -> None:
     with pytest.raises(ConfigError, match=r"nodes\.count = 12: .* needs at least (\d+) UAVs") as refused:
         catalog.find("rescue", ["nodes.count=12", "traffic.sources=11"])

@@ -76,6 +76,25 @@ def test_pads_that_receivers_confuse_are_noted(changes: tuple[str, ...], *, told
     assert len(found) == told
 
 
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        (["nodes.altitude_m=77"], []),
+        (["nodes.altitude_m=85"], ["over nodes.altitude_m = 85 that needs 128 m"]),
+        (["nodes.altitude_m=85", "mission.ceiling_m=128"], []),
+        (["mobility.return_step_m=5"], []),
+        (
+            ["mobility.return_step_m=5", "mobility.return_after_s=9"],
+            ["UAV 16 returns at 175 m, above mission.ceiling_m"],
+        ),
+        (["mobility.return_step_m=1", "mobility.geofence=return"], []),
+    ],
+)
+def test_heights_that_a_ceiling_has_no_room_for_are_noted(changes: list[str], said: list[str]) -> None:
+    found = notes(catalog.find("rescue", ["nodes.count=16", "traffic.sources=15", *changes]))
+    assert [any(part in note for part in said) for note in found] == [True] * len(said)
+
+
 def test_an_order_after_the_end_is_noted() -> None:
     orders = 'orders=[{order="end", at_s=70}, {order="end", at_s=9}]'
     found = notes(catalog.find("rescue", ["duration_s=40", "ground.at_m=[0, 0]", orders]))

@@ -62,8 +62,9 @@ class _Uav:
         )  # fmt: skip
         self._roll_call = RollCall(node, hello_interval_s=1.0)
         self._flight = Flight(
-            own, board.place, board.goal, choice, tied, roll_call=self._roll_call, take_off=None, return_home=home
-        )
+            own, board.place, board.goal, choice, tied, roll_call=self._roll_call, take_off=None, return_home=home,
+            height_m=at.up, ceiling_m=120.0,
+        )  # fmt: skip
 
     def fly(self, at: Enu, velocity: Enu, now_ns: int) -> Enu:
         self.board.place.close_ranks(self.lost, now_ns, parted=self.parted)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 
 import pytest
 
@@ -327,6 +328,26 @@ def test_a_uav_that_hears_that_it_is_lost_keeps_its_place_far_above_those_who_cl
     flight.searcher.on_message(told, now_ns=flight.now_ns)
     flight.fly(20)
     assert flight.at.up < here.up + 3, "it is heard again"
+
+
+def test_who_is_mute_stays_below_the_ceiling_and_apart_from_those_mute_beside_it(
+    make_scenario: Callable[..., Scenario],
+) -> None:
+    """They flew up to 86 m above their lanes, at 151 m."""
+    heights_m = []
+    for node in range(1, 8):
+        flight = Flight(make_scenario, node, home=HOME._replace(up=90.0))
+        flight.fly(1)
+        lost = frozenset({flight.plan.nodes.index(node)})
+        for _ in range(30):
+            at, plan = flight.now_ns // ROLL_NS, flight.plan
+            told = Roll(at, plan.planner, plan.revision, (0,) * len(plan.nodes), lost)
+            flight.searcher.on_message(told, now_ns=flight.now_ns)
+            flight.fly(1)
+        heights_m.append(flight.at.up)
+    assert max(heights_m) < 117
+    assert min(heights_m) > 65 + 18 + 4, "above those who fly home"
+    assert min(higher - up for up, higher in pairwise(sorted(heights_m))) > 4
 
 
 @pytest.mark.parametrize("by", ["hellos", "radar"])

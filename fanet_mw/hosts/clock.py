@@ -50,6 +50,11 @@ def given_epoch_ns(epoch_unix_s: float, scenario: Scenario) -> int:
     return round(epoch_unix_s * S)
 
 
+def _is_of(clock: ClockEpoch, machine: int) -> bool:
+    """True if the keeper's monotonic clock is that of this machine."""
+    return clock.machine != 0 and clock.machine == machine
+
+
 class SwarmClock:
     """The swarm instant as this process reads it."""
 
@@ -69,7 +74,7 @@ class SwarmClock:
 
     def _on_this_machine(self, clock: ClockEpoch) -> int:
         """The epoch on the monotonic clock of this machine."""
-        if clock.machine and clock.machine == self._machine:
+        if _is_of(clock, self._machine):
             return clock.epoch_mono_ns
         return clock.epoch_unix_ns - self._unix_less_mono_ns
 
@@ -215,8 +220,10 @@ class ClockListener:
         self._names = names
         self._loop = asyncio.get_running_loop()
         self._running: asyncio.Future[SwarmClock] = self._loop.create_future()
-        self._kept = True
-        """False for an epoch that all were given beforehand."""
+        self._can_be_off = True
+        """False for an epoch that all were given beforehand, and for one of this machine's own clock: if that was told
+        late, the keeper stood still.
+        """
         self._epochs: dict[int, int] = {}
         """The unix time [ns] of swarm instant 0 in each announcement, by its number."""
         self.failure: BusError | None = None
@@ -270,7 +277,7 @@ class ClockListener:
                     if self._running.result().follow(message):
                         self.changed.set()
                 else:
-                    self._kept = message.epoch_mono_ns != 0
+                    self._can_be_off = message.epoch_mono_ns != 0 and not _is_of(message, self._timebase.machine)
                     self._running.set_result(SwarmClock(message, self._timebase))
 
     async def running(self, *, timeout_s: float) -> SwarmClock:
@@ -287,7 +294,7 @@ class ClockListener:
                 waited_s, unanswered_s = waited_s + _ASK_EVERY_S, asked_s
                 self._bus.check()
             else:
-                if self._kept:
+                if self._can_be_off:
                     _require_near(-clock.wait_s(0), most_s=self._loop.time() - unanswered_s)
                 return clock
         raise BusError(f"nobody started the swarm clock on {self._names.clock} within {timeout_s:g} s")

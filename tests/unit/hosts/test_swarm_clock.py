@@ -214,3 +214,19 @@ async def test_a_machine_whose_clock_is_far_from_the_keepers_is_told_and_takes_n
         return
     with pytest.raises(BusError, match=said):
         await listener.running(timeout_s=1)
+
+
+async def test_who_hears_late_from_a_keeper_on_the_same_machine_has_no_wrong_clock(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """All services left a launcher that had stood still for 5 s when the clock began, and blamed NTP."""
+    monkeypatch.setattr(clock_module, "_ASK_EVERY_S", 0.01)
+    monkeypatch.setattr(clock_module, "_ASK_AGAIN_S", 0.0)
+    machine = Machine()
+    _, told = await started(machine, 1.0)
+    machine.let_pass(5)
+    listener = ClockListener(Answering(told, silent=2), Topics("slow"), machine.keepers)  # type: ignore[arg-type]
+    assert (await listener.running(timeout_s=1)).now_ns() == 5 * S
+    other = ClockListener(Answering(told, silent=2), Topics("slow"), machine.other)  # type: ignore[arg-type]
+    with pytest.raises(BusError, match=r"5\.0 s ahead of"):
+        await other.running(timeout_s=1)

@@ -80,6 +80,11 @@ def system_id(node: int) -> int:
     return (node - 1) % 250 + 1
 
 
+def node_of_system(system: int, *, nodes: int) -> int:
+    """The node of a swarm of so many that a system id stands for; 0 if there are several."""
+    return system if nodes < system + 250 else 0
+
+
 class Spec(NamedTuple):
     """The definition of a message, as MAVLink needs it: id, CRC_EXTRA, payload layout."""
 

@@ -10,6 +10,7 @@ from fanet_mw.errors import MalformedFrameError
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record
 from fanet_mw.units import US
+from fanet_mw.wire import node_of_system
 from sim.inspection.messages import Messages
 from sim.inspection.packets import Packets
 from sim.observation.observer import Observer
@@ -75,11 +76,11 @@ class Inspection(Observer):
 def of_folder(folder: RunFolder) -> Inspection:
     """What the folder of a run holds; a log of MAVLink that is cut off there is counted as malformed."""
     found = Inspection(folder.scenario)
-    epoch_us: int | None = None
+    epoch_ns = folder.summary.get("epoch_unix_ns", 0)
     try:
         for t_us, frame in tlog.read(folder.folder / TLOG_FILE):
-            epoch_us = t_us if epoch_us is None else epoch_us
-            found.take_tap(frame[5], (t_us - epoch_us) * US, frame)
+            node = node_of_system(frame[5], nodes=folder.scenario.node_count)
+            found.take_tap(node, t_us * US - epoch_ns, frame)
     except MalformedFrameError:
         found.messages.malformed += 1
     except OSError:

@@ -31,6 +31,7 @@ from fanet_mw.trace import (
     RoleChanged,
 )
 from fanet_mw.units import MS, STILL, US, S
+from fanet_mw.wire import node_of_system
 from sim.observation.bus_feed import makes_sense
 from sim.observation.event_text import event_line
 from sim.observation.swarm_state import Event, SwarmState
@@ -117,7 +118,7 @@ class Timeline:
             records = end
             while taps < len(self._taps) and self._taps[taps][0] <= second_ns:
                 t_ns, frame = self._taps[taps]
-                self.state.take_tap(frame[5], t_ns, frame)
+                self.state.take_tap(node_of_system(frame[5], nodes=self.scenario.node_count), t_ns, frame)
                 taps += 1
             while links < len(self._links) and self._links[links].t_ns <= second_ns:
                 self.state.take_links(self._links[links])

@@ -14,6 +14,7 @@ from fanet_mw.errors import BusError, ConfigError
 from fanet_mw.trace import Posed, Record
 from fanet_mw.units import S
 from fanet_mw.whole_file import replacing, writing
+from fanet_mw.wire import node_of_system
 from sim.observation.bus_feed import BusFeed, Paced
 from sim.recording.mcap_recording import McapRecording
 from sim.results.outcome import Outcome
@@ -83,7 +84,7 @@ def _retell(outcome: Outcome, recording: McapRecording) -> None:
         recording.take_records(item for item in items if not isinstance(item, Posed | bytes))
         for item in items:
             if isinstance(item, bytes):
-                recording.take_tap(item[5], t_ns, item)
+                recording.take_tap(node_of_system(item[5], nodes=outcome.scenario.node_count), t_ns, item)
 
 
 def _timeline(outcome: Outcome) -> Iterator[tuple[int, int, Any]]:

@@ -14,7 +14,7 @@ from textual.widgets import Input, Static, TabbedContent
 from fanet_mw.flavors import Mode
 from fanet_mw.mavlink import Encoder
 from fanet_mw.trace import BoundExcludes, BoundStated, Delivered, Dropped, Generated, LetOut
-from fanet_mw.units import MS, Enu, NodeId, S
+from fanet_mw.units import MS, US, Enu, NodeId, S
 from sim.inspection.inspection import Inspection, of_folder
 from sim.inspection.messages import Messages, fields_of, name_of
 from sim.inspection.packets import Packets
@@ -142,6 +142,14 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         out=out,
     )
     return out
+
+
+def test_the_messages_of_a_folder_have_instants_of_the_swarm(folder: Path) -> None:
+    """They counted from the first one, and rates of all the time were too high."""
+    run = RunFolder(folder)
+    (first_us, _), *_ = run.telemetry()
+    since = min(stream.first_ns for stream in of_folder(run).messages.streams.values())
+    assert since == first_us * US - run.summary["epoch_unix_ns"] > 0
 
 
 async def test_the_screens_show_a_recording(folder: Path) -> None:

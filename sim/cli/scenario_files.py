@@ -61,7 +61,7 @@ def init(
 
     text = catalog.text_of(from_)
     content = commented(tomllib.loads(text), every_key=not short, schema=schema)
-    config.parse(content, source=str(file), name="made")
+    config.parse(content, source=str(file), name="made", folder=file.parent)
     if file.exists() and not force:
         raise ConfigError(f"{file}: is there already; choose another name, or replace it with --force")
     _write(file, content)

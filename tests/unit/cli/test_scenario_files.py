@@ -47,6 +47,17 @@ def test_from_init_over_check_to_show(tmp_path: Path, capsys: pytest.CaptureFixt
     assert "hop_limit" not in file.read_text()
 
 
+def test_init_starts_from_a_file_that_names_others_beside_it(tmp_path: Path) -> None:
+    """It said that such keys are read with a scenario file only, which it was."""
+    (tmp_path / "load.csv").write_text("0,100\n1,200\n")
+    first, second = tmp_path / "first.toml", tmp_path / "second.toml"
+    first.write_text('duration_s = 9\n[traffic]\narrivals = "trace"\npackets_csv = "load.csv"\n')
+    assert fanet("init", str(second), "--from", str(first), "--short") == 0
+    assert catalog.find(second).traffic.packets == ((0.0, 100), (1.0, 200))
+    with pytest.raises(ConfigError, match=r"elsewhere/load\.csv: cannot be read"):
+        fanet("init", str(tmp_path / "elsewhere" / "third.toml"), "--from", str(first))
+
+
 def test_a_wrong_file_is_told_every_mistake(tmp_path: Path) -> None:
     file = tmp_path / "wrong.toml"
     file.write_text('duration_s = "3 m"\n')

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import Message, TraceBatch
-from fanet_mw.bus.radio_control import Control, Restore, nodes_of
+from fanet_mw.bus.radio_control import Control, Mishap, MishapKind, Restore, nodes_of
 from fanet_mw.bus.topics import ROOT, Topics
 from fanet_mw.errors import FanetError, MalformedFrameError
 from fanet_mw.hosts.bus import Bus, config_of
@@ -55,11 +55,8 @@ def change(endpoint: str, swarm: str | None, control: Control, *, zenoh_config: 
     """Send one change; returns what the emulator has done. Raises BusError without a router, else FanetError."""
     with Bus.join(endpoint, config_of(zenoh_config, OPERATOR)) as bus:
         names = Topics(swarm or find_swarm(bus))
-        count = scenario_of_swarm(bus, names).get("nodes", {}).get("count")
-        if isinstance(count, int) and not isinstance(control, Restore):
-            for node in nodes_of(control):
-                if node > count:
-                    raise FanetError(f"node {node}: the nodes of swarm {names.swarm} are 1 to {count}")
+        if (why := impossible(control, scenario_of_swarm(bus, names), names.swarm)) is not None:
+            raise FanetError(why)
 
         def confirms(record: Record) -> bool:
             return isinstance(record, RadioFault) and control.label in ("", record.label)
@@ -71,6 +68,22 @@ def change(endpoint: str, swarm: str | None, control: Control, *, zenoh_config: 
                 f"or no emulator on {names.radio_control}"
             )
         return [record for record in done if isinstance(record, RadioFault)]
+
+
+def impossible(control: Control, tree: Mapping[str, Any], swarm: str) -> str | None:
+    """Why a change can do nothing in a swarm with this scenario, as in a file; None if it can, or nobody says."""
+    count = tree.get("nodes", {}).get("count")
+    if not isinstance(count, int) or isinstance(control, Restore):
+        return None
+    befalls = isinstance(control, Mishap)
+    most = count + (bool(tree.get("ground", {}).get("at_m")) and not befalls)
+    for node in nodes_of(control):
+        if node > most:
+            return f"node {node}: the {'UAVs' if befalls else 'nodes'} of swarm {swarm} are 1 to {most}"
+    drains = tree.get("sensors", {}).get("battery_hz") or tree.get("world", {}).get("engine") == "rotors"
+    if isinstance(control, Mishap) and control.what is MishapKind.BATTERY and not drains:
+        return f"battery: swarm {swarm} has none: its scenario has sensors.battery_hz = 0"
+    return None
 
 
 def put_and_watch(

@@ -306,6 +306,14 @@ class ProcessEnded(NamedTuple):
     exit_code: int
 
 
+class ProcessStarted(NamedTuple):
+    """A process that had ended was started again (`fanet launch --respawn`)."""
+
+    t_ns: int
+    node: int
+    name: str
+
+
 class ClockSampled(NamedTuple):
     """The error of a node's swarm time at a true instant."""
 
@@ -380,6 +388,7 @@ Record = (
     | Warned
     | ConflictOver
     | ProcessEnded
+    | ProcessStarted
     | RadioFault
     | ClockSampled
     | DeadlineMet

@@ -15,6 +15,7 @@ from fanet_mw.trace import (
     PlacedAmong,
     PlacedInside,
     ProcessEnded,
+    ProcessStarted,
     RadioFault,
     Record,
     Refuted,
@@ -47,6 +48,8 @@ def event_text(record: Record) -> str:
             return f"has mission mode {record.mode}"
         case ProcessEnded():
             return f"process {record.name} ended"
+        case ProcessStarted():
+            return f"process {record.name} is started again"
         case RadioFault():
             return f"radio fault {record.kind} {record.label} {'begins' if record.active else 'ends'}"
         case RoleChanged() if record.role == "head":

@@ -25,6 +25,7 @@ from fanet_mw.trace import (
     FlightModeChanged,
     Posed,
     ProcessEnded,
+    ProcessStarted,
     RadioFault,
     Record,
     Refuted,
@@ -43,7 +44,16 @@ _EVERY_NS: Final = 10 * S
 _TURNS: Final = ("slots", "turns")
 _MOST_TOLD: Final = 1 << 20
 _MOST_BROKEN: Final = 50
-_NOTABLE: Final = (Confirmed, Refuted, RadioFault, ProcessEnded, Collided, FlightModeChanged, RoleChanged)
+_NOTABLE: Final = (
+    Confirmed,
+    Refuted,
+    RadioFault,
+    ProcessEnded,
+    ProcessStarted,
+    Collided,
+    FlightModeChanged,
+    RoleChanged,
+)
 
 
 class _Report(NamedTuple):

@@ -25,6 +25,7 @@ from fanet_mw.trace import (
     MissionModeChanged,
     Posed,
     ProcessEnded,
+    ProcessStarted,
     RadioFault,
     Record,
     Refuted,
@@ -47,6 +48,7 @@ _SPEAKERS: Final[dict[type[Any], str | None]] = {
     FlightModeChanged: "world",
     RadioFault: "emulator",
     ProcessEnded: None,
+    ProcessStarted: None,
 }
 """The only actor that may send each of these kinds; None: no actor. All others are sent by the node that they name."""
 _ABOUT_NOBODY: Final = (MissionModeChanged, Sighted)

@@ -6,7 +6,7 @@ Positions are sampled once a second, in longer or larger runs so rarely that the
 
 import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final
@@ -26,6 +26,7 @@ from fanet_mw.trace import (
     MissionModeChanged,
     Posed,
     ProcessEnded,
+    ProcessStarted,
     RadioFault,
     Record,
     Refuted,
@@ -43,7 +44,7 @@ from sim.world.environment.obstacles import Box, obstacles
 
 REPLAYED: Final = (
     Posed, RoleChanged, FlightModeChanged, MissionModeChanged, Detected, Approaching, Arrived, Confirmed, Refuted,
-    Collided, ProcessEnded, RadioFault,
+    Collided, ProcessEnded, ProcessStarted, RadioFault,
 )  # fmt: skip
 """The kinds of records that a replay needs: few of a trace, most of which are deliveries."""
 _MOST_POINTS: Final = 150_000
@@ -88,13 +89,24 @@ def content(replay: Replay) -> dict[str, Any]:
         "flight": _modes(replay.records, FlightModeChanged, nodes),
         "mission": _modes(replay.records, MissionModeChanged, nodes),
         "role": _modes(replay.records, RoleChanged, nodes),
-        "ended": {one.node: one.t_ns / S for one in replay.records if isinstance(one, ProcessEnded) and one.node},
+        "ended": _ended(replay.records),
         **_people(replay),
         "covered": [t_ns / S if t_ns >= 0 else -1 for t_ns in replay.covered_ns.ravel().tolist()],
         "solids": _solids(scenario),
         "no_fly": scenario.world.no_fly_m,
         "events": list(_events(replay.records)),
     }
+
+
+def _ended(records: Iterable[Record]) -> dict[int, float]:
+    """When the process of each UAV ended for good [s]."""
+    ended: dict[int, float] = {}
+    for one in records:
+        if isinstance(one, ProcessEnded) and one.node:
+            ended[one.node] = one.t_ns / S
+        elif isinstance(one, ProcessStarted):
+            ended.pop(one.node, None)
+    return ended
 
 
 def _positions(replay: Replay, nodes: Sequence[NodeId], end_s: float, step_s: int) -> list[list[int]]:

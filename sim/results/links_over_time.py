@@ -15,7 +15,7 @@ import numpy.typing as npt
 from agents.applications.traffic import sources_of, targets_of
 from emulator.channel.link_budget import heard_m
 from fanet_mw.scenario.model import Scenario
-from fanet_mw.trace import Posed, ProcessEnded, RadioFault
+from fanet_mw.trace import Posed, ProcessEnded, ProcessStarted, RadioFault
 from fanet_mw.units import S
 from sim.records.record_kinds import records_of
 from sim.results.outcome import Outcome
@@ -102,12 +102,14 @@ def _places(outcome: Outcome, count: int) -> list[Rows]:
             found.append(now if changed else found[-1])
             changed = False
 
-    for record in records_of(outcome.records, Posed, ProcessEnded, RadioFault):
+    for record in records_of(outcome.records, Posed, ProcessEnded, ProcessStarted, RadioFault):
         fill(-(-record.t_ns // S))
         if type(record) is Posed:
             at[record.node - 1] = record.east_m, record.north_m, record.up_m
         elif type(record) is ProcessEnded:
             dead.add(record.node)
+        elif type(record) is ProcessStarted:
+            dead.discard(record.node)
         elif type(record) is RadioFault and record.kind in OFF_AIR:
             faults.pop(record.label, None)
             faults.update({record.label: record.node} if record.active else {})

@@ -26,6 +26,7 @@ from fanet_mw.trace import (
     PlacedInside,
     Posed,
     ProcessEnded,
+    ProcessStarted,
     RadioFault,
     Record,
     Refuted,
@@ -268,9 +269,12 @@ def searching_instants(records: Iterable[Record]) -> Iterator[tuple[int, Rows, F
     rows: list[tuple[float, float, float]] = []
     searching: list[bool] = []
     t_ns = 0
-    for record in records_of(records, ProcessEnded, RadioFault, MissionModeChanged, FlightModeChanged, Posed):
+    kinds = (ProcessEnded, ProcessStarted, RadioFault, MissionModeChanged, FlightModeChanged, Posed)
+    for record in records_of(records, *kinds):
         if type(record) is ProcessEnded:
             dead.add(record.node)
+        elif type(record) is ProcessStarted:
+            dead.discard(record.node)
         elif type(record) is RadioFault and record.kind in OFF_AIR:
             off_air.pop(record.label, None)
             off_air.update({record.label: record.node} if record.active else {})

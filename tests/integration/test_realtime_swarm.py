@@ -24,7 +24,7 @@ from emulator.compile_kernel import must_compile, warm_up
 from fanet_mw import tlog
 from fanet_mw.errors import BusError
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import ProcessEnded
+from fanet_mw.trace import ProcessEnded, ProcessStarted
 from fanet_mw.units import NodeId, S
 from sim.results.files import finish
 from sim.results.outcome import Outcome
@@ -158,6 +158,8 @@ def test_a_killed_agent_is_started_again_with_respawn_and_takes_part() -> None:
     report = outcome.reports["agent-4"]
     assert report["final"]
     assert report["role"] != "isolated", "it has learned its place from the schedule"
+    told = [type(record) for record in outcome.records if isinstance(record, ProcessEnded | ProcessStarted)]
+    assert told == [ProcessEnded, ProcessStarted]
 
 
 def test_without_the_emulator_the_run_ends_at_once_with_a_partial_result() -> None:

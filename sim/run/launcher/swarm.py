@@ -33,7 +33,7 @@ from fanet_mw.hosts.realtime import SwarmAddress
 from fanet_mw.hosts.service import BUS_EXIT_CODE
 from fanet_mw.routing import module_of
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import ProcessEnded
+from fanet_mw.trace import ProcessEnded, ProcessStarted
 from fanet_mw.units import MS, S
 from sim.bus.rights import ROUTER
 from sim.bus.running_swarms import registered
@@ -61,8 +61,8 @@ class Deaths:
     def __init__(self, *, respawn: bool) -> None:
         self.ended: list[tuple[str, int]] = []
         """Name and exit code of each process that died, in order."""
-        self.records: list[ProcessEnded] = []
-        """The same as trace records."""
+        self.records: list[ProcessEnded | ProcessStarted] = []
+        """The same as trace records, and which of them were started again."""
         self._respawn = respawn
         self._respawns: Counter[str] = Counter()
         self._late_starts: Counter[str] = Counter()
@@ -78,6 +78,11 @@ class Deaths:
         """A process has died; `node` is its UAV, or 0 for the emulator and the world."""
         self.ended.append((name, exit_code))
         self.records.append(ProcessEnded(now_ns, node, name, exit_code))
+
+    def note_start(self, name: str, *, node: int, now_ns: int) -> None:
+        """A process was started again, perhaps one that has died."""
+        if any(ended == name for ended, _ in self.ended):
+            self.records.append(ProcessStarted(now_ns, node, name))
 
     def grant_respawn(self, name: str) -> bool:
         """True if a process that has died may be started again."""
@@ -370,7 +375,7 @@ class SwarmRun:
             self._tell(f"{name} is stopped at {self._now_ns() / S:.1f} s, as planned")
             return
         now_ns = self._now_ns()
-        node = int(name.removeprefix("agent-")) if name.startswith("agent-") else 0
+        node = _node_of(name)
         self._deaths.note(name, exit_code, node=node, now_ns=now_ns)
         what = f"{name} ended with {described(exit_code)} at {now_ns / S:.1f} s"
         if (server := self.processes.end_of_server(name)) is not None:
@@ -395,13 +400,13 @@ class SwarmRun:
         try:
             self.processes.restart(name, **more)
             self._collector.begin(name)
+            self._deaths.note_start(name, node=_node_of(name), now_ns=self._now_ns())
         except HostError as error:
             if not name.startswith("agent-") or self._clock is None:
                 self.abort(f"{error}; the run cannot go on without it", broken=True)
                 return
             if all(ended != name for ended, _ in self._deaths.ended):  # it was stopped as planned
-                node = int(name.removeprefix("agent-"))
-                self._deaths.note(name, -signal.SIGKILL, node=node, now_ns=self._now_ns())
+                self._deaths.note(name, -signal.SIGKILL, node=_node_of(name), now_ns=self._now_ns())
             self._tell(f"{error}; the others carry on")
 
     def _now_ns(self) -> int:
@@ -410,6 +415,11 @@ class SwarmRun:
 
     def time_is_over(self) -> bool:
         return self._clock is not None and self._clock.wait_s(self._services.scenario.duration_ns) <= 0.05
+
+
+def _node_of(name: str) -> int:
+    """The UAV whose process this is; 0 for the emulator and the world."""
+    return int(name.removeprefix("agent-")) if name.startswith("agent-") else 0
 
 
 async def _any_done(*futures: asyncio.Future[Any], timeout_s: float) -> bool:

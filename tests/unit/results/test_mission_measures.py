@@ -16,6 +16,7 @@ from fanet_mw.trace import (
     MissionModeChanged,
     Posed,
     ProcessEnded,
+    ProcessStarted,
     Record,
     Refuted,
 )
@@ -47,6 +48,12 @@ def test_a_swarm_is_connected_while_everyone_reaches_everyone_over_hops() -> Non
 def test_the_dead_need_no_connection() -> None:
     found = measured([ProcessEnded(S, 3, "agent-3", 1), *at(2, 0, 240, 900)])
     assert found["connected"] == 1.0
+
+
+def test_who_was_started_again_is_none_of_the_dead() -> None:
+    """Under --respawn a UAV counted as dead to the end, though it flew on."""
+    again = [ProcessEnded(S, 3, "agent-3", 1), ProcessStarted(S, 3, "agent-3")]
+    assert measured([*again, *at(2, 0, 240, 900)])["connected"] == 0.0
 
 
 @pytest.mark.parametrize("back", ["goto", "return"])

@@ -3,6 +3,8 @@
 import pytest
 from kit import MakeScenario
 
+from fanet_mw.trace import ProcessEnded, ProcessStarted
+from fanet_mw.units import S
 from sim.results.links_over_time import LinksOverTime, connectivity
 from sim.results.outcome import Outcome
 
@@ -22,6 +24,13 @@ def test_who_never_says_where_it_is_stays_where_it_was_put(make_scenario: MakeSc
     links = LinksOverTime(Outcome(make_scenario(**keys), "virtual", 1.0, [], {}))
     assert links.at(0).tolist() == [[True, True, False], [True, True, True], [False, True, True]]
     assert links.at(0) is links.at(0)
+
+
+def test_who_was_started_again_has_links_again(make_scenario: MakeScenario) -> None:
+    keys = {"nodes.count": 2, "nodes.spacing_m": 240, "nodes.layout": "line", "radio.range_m": 250}
+    records = [ProcessEnded(2 * S, 2, "agent-2", -9), ProcessStarted(5 * S, 2, "agent-2")]
+    links = LinksOverTime(Outcome(make_scenario(**keys), "virtual", 1.0, records, {}))
+    assert [bool(links.at(second)[0, 1]) for second in (1, 3, 6)] == [True, False, True]
 
 
 @pytest.mark.parametrize(("sources", "to", "share"), [([1], 2, 1.0), ([1], 3, 0.0), ([1, 3], 2, 0.5), ([2, 3], 1, 0.5)])

@@ -21,6 +21,7 @@ from fanet_mw.trace import (
     PlacedInside,
     Posed,
     ProcessEnded,
+    ProcessStarted,
     Record,
     Refuted,
     RoleChanged,
@@ -95,6 +96,12 @@ def test_a_place_is_between_the_records_before_and_after_the_instant(make_scenar
 def test_the_cluster_of_a_uav_is_that_of_the_instant(replay: Replay) -> None:
     assert [(state.role, state.head) for state in replay.at(2.5).values()] == [("head", 1), ("", 0)]
     assert [(state.role, state.head) for state in replay.at(3.0).values()] == [("head", 1), ("member", 1)]
+
+
+def test_who_was_started_again_has_not_ended(make_scenario: Callable[..., Scenario]) -> None:
+    again = [*RECORDS, ProcessStarted(15 * S, 2, "agent-2")]
+    ended = [replay_page.content(Replay(make_scenario(**KEYS), records))["ended"] for records in (RECORDS, again)]
+    assert ended == [{2: 15.0}, {}]
 
 
 def test_the_page_has_all_that_is_shown_and_asks_for_nothing(replay: Replay, tmp_path: Path) -> None:

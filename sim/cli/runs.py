@@ -261,9 +261,14 @@ def _watched(scenario: "Scenario", *, bar: bool, lines: bool = True) -> Iterator
         from rich.progress import Progress as Bar
 
         columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.0f}/{task.total:.0f} s"))
-        with Bar(*columns, TimeElapsedColumn(), console=_err, transient=True) as shown:
-            task = shown.add_task(scenario.name, total=scenario.duration_s)
+        shown = Bar(*columns, TimeElapsedColumn(), console=_err, transient=True)
+        task = shown.add_task(scenario.name, total=scenario.duration_s)
+        shown.start()
+        try:
             yield lambda at: shown.update(task, completed=at.swarm_s, description=f"{scenario.name}: {at.in_words()}")
+        finally:
+            with suppress(OSError):  # as in `_say`
+                shown.stop()
         return
     said_s = monotonic()
 

@@ -1,10 +1,14 @@
 """What a run in real time says while it lasts, without a terminal."""
 
+import errno
+import io
+
 import pytest
 from kit import MakeScenario
 
 from fanet_mw.scenario import Scenario
 from sim.cli import runs
+from sim.console import Console
 from sim.run.collecting.running_tally import Progress
 
 
@@ -50,3 +54,29 @@ def test_nobody_who_listens_costs_no_run(monkeypatch: pytest.MonkeyPatch) -> Non
 
     monkeypatch.setattr(runs._err, "print", gone)
     runs._say("47 processes up")
+
+
+class ClosingTerminal(io.StringIO):
+    """A terminal whose window is closed at some time."""
+
+    closes = False
+
+    def isatty(self) -> bool:
+        return True
+
+    def write(self, text: str) -> int:
+        if self.closes:
+            raise OSError(errno.EIO, "Input/output error")
+        return super().write(text)
+
+
+def test_a_terminal_that_is_closed_costs_no_result(
+    monkeypatch: pytest.MonkeyPatch, make_scenario: MakeScenario
+) -> None:
+    """The bar raised as it was taken away, before anything was written: all that was flown was lost with the window."""
+    terminal = ClosingTerminal()
+    monkeypatch.setattr(runs, "_err", Console(file=terminal, force_terminal=True))
+    with runs._watched(make_scenario(), bar=True) as tell:
+        tell(state(1.0))
+        terminal.closes = True
+    assert "unnamed" in terminal.getvalue()

@@ -11,7 +11,7 @@ everything else.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Final, NamedTuple
 
 from agents.mission.navigation.half_planes import HalfPlane
@@ -54,6 +54,9 @@ _AGAIN_NS: Final = 15 * S
 _MOVER_NS: Final = seconds_to_ns(1.2)
 """How long a flying body that the radar has shown is avoided."""
 
+_Circle = tuple[float, float, float]
+"""East, north and radius."""
+
 
 class Mover(NamedTuple):
     """Something that flies, as the radar shows it; only the part of its velocity along the ray is known."""
@@ -71,8 +74,7 @@ class _Echoed(NamedTuple):
 class KnownObstacles:
     """The known obstacles of one UAV, and the way around them."""
 
-    def __init__(self, onboard_map: OnboardMap, no_fly_m: Sequence[tuple[float, float, float]] = ()) -> None:
-        """`no_fly_m`: no-fly areas as (east, north, radius)."""
+    def __init__(self, onboard_map: OnboardMap, no_fly_m: Sequence[_Circle] = ()) -> None:
         self._map = onboard_map
         self._index = indexed(onboard_map, margin_m=_MARGIN_M, watch_m=_WATCH_M)
         self._no_fly = tuple(no_fly_m)
@@ -207,10 +209,12 @@ class KnownObstacles:
         if not self._any and not self._taken and not self.hovering:
             return None
 
-        def taken(cell: Cell) -> bool:
-            return self._is_taken(cell, at.up, now_ns)
+        circles = self._circles(at.up)
 
-        here, there = (at.east, at.north), self._reachable(goal, moves, at.up, now_ns)
+        def taken(cell: Cell) -> bool:
+            return self._is_taken(cell, at.up, circles, now_ns)
+
+        here, there = (at.east, at.north), _reachable(goal, moves, taken)
         if there is None:
             return None
         distance = math.hypot(there[0] - here[0], there[1] - here[1])
@@ -232,29 +236,17 @@ class KnownObstacles:
         corner = self._corner
         return corner is not None and math.hypot(corner[0] - here[0], corner[1] - here[1]) <= CELL_M
 
-    def _reachable(self, goal: Enu, moves: Enu, up_m: float, now_ns: int) -> Place | None:
-        """The goal; or the place where a moving goal leaves an obstacle; or a free place beside it."""
-        for seconds in range(_AHEAD_S + 1):
-            place = goal.east + seconds * moves.east, goal.north + seconds * moves.north
-            if not self._is_taken(cell_of(*place), up_m, now_ns):
-                return place
-            if not (moves.east or moves.north):
-                break
-        cell = nearest_free((goal.east, goal.north), lambda cell: self._is_taken(cell, up_m, now_ns), within=_RINGS)
-        return None if cell is None else middle_of(cell)
-
-    def _circles(self, up_m: float) -> Sequence[tuple[float, float, float]]:
-        """East, north and radius of what must be flown around at a height: no-fly areas, and lost UAVs near it."""
+    def _circles(self, up_m: float) -> Sequence[_Circle]:
+        """What must be flown around at a height: no-fly areas, and lost UAVs near it."""
         if not self.hovering:
             return self._no_fly
         at_height = ((at.east, at.north, radius) for at, radius in self.hovering if abs(at.up - up_m) <= OVER_M)
         return [*self._no_fly, *at_height]
 
-    def _is_taken(self, cell: Cell, up_m: float, now_ns: int) -> bool:
+    def _is_taken(self, cell: Cell, up_m: float, circles: Sequence[_Circle], now_ns: int) -> bool:
         roof_m = self._index.roofs_m.get(cell)
         if roof_m is not None and roof_m + OVER_M > up_m:
             return True
-        circles = self._circles(up_m)
         if circles:
             east, north = middle_of(cell)
             if any(math.hypot(east - e, north - n) <= radius + _MARGIN_M for e, n, radius in circles):
@@ -269,3 +261,15 @@ def _put(cells: dict[Cell, _Echoed], cell: Cell, fresh: _Echoed, now_ns: int) ->
     if before is not None and before.until_ns > now_ns:
         fresh = _Echoed(max(before.top_m, fresh.top_m), max(before.until_ns, fresh.until_ns))
     cells[cell] = fresh
+
+
+def _reachable(goal: Enu, moves: Enu, taken: Callable[[Cell], bool]) -> Place | None:
+    """The goal; or the place where a moving goal leaves an obstacle; or a free place beside it."""
+    for seconds in range(_AHEAD_S + 1):
+        place = goal.east + seconds * moves.east, goal.north + seconds * moves.north
+        if not taken(cell_of(*place)):
+            return place
+        if not (moves.east or moves.north):
+            break
+    cell = nearest_free((goal.east, goal.north), taken, within=_RINGS)
+    return None if cell is None else middle_of(cell)

@@ -110,11 +110,8 @@ class Pattern:
 
     def has_beside(self, place: int, others: frozenset[int]) -> bool:
         """True if one of these places is in the row of a place, or in a row that ends there."""
-        return any(
-            others.intersection(row.places)
-            for row in self._rows
-            if place in row.places or set(self._whole.tethers(place)).intersection(row.places)
-        )
+        beside = {place, *self._whole.tethers(place)}
+        return any(others.intersection(row.places) and beside.intersection(row.places) for row in self._rows)
 
     def gap_beside(self, place: int, lost: frozenset[int]) -> tuple[int, bool]:
         """How many are lost in the gap in its row nearest to a place, and whether at higher places; 0 without one."""
@@ -171,8 +168,10 @@ class Pattern:
         if self.kind(place) == "follower":
             return True
         rank = place - sum(other < place for other in self.vacant)
+        if rank % 2 == 0:
+            return False
         at, left = self._flown.get(place, place), self._rows[0].left(self.vacant)
-        return rank % 2 == 1 and self.shape.may_leave(at, swept_s, reach_m=_LEAVES * self.reach_m, left=left)
+        return self.shape.may_leave(at, swept_s, reach_m=_LEAVES * self.reach_m, left=left)
 
     def velocity(self, place: int, swept_s: float) -> Enu:
         """The velocity of a place, without shifts to other lanes: meanwhile all wait, and who is behind stays there."""

@@ -22,7 +22,8 @@ def test_a_process_that_hangs_is_named_once_and_one_that_has_ended_is_not() -> N
 def test_the_silence_of_a_process_that_is_started_again_counts_from_then_on() -> None:
     begun: list[str] = []
     run = SimpleNamespace(
-        processes=SimpleNamespace(restart=begun.append), _collector=SimpleNamespace(begin=begun.append)
-    )
+        processes=SimpleNamespace(restart=begun.append), _collector=SimpleNamespace(begin=begun.append),
+        _deaths=SimpleNamespace(note_start=lambda name, **_: begun.append(name)), _now_ns=lambda: 7 * S,
+    )  # fmt: skip
     SwarmRun._start_again(cast("Any", run), "agent-3")
-    assert begun == ["agent-3", "agent-3"]
+    assert begun == ["agent-3"] * 3

@@ -366,7 +366,6 @@ def _impossible_faults(scenario: Scenario) -> Sequence[str]:
             found.append(
                 f"faults.{index}: nodes names all {scenario.node_count} nodes, which leaves nobody on the other side"
             )
-        drains = scenario.sensors.battery_hz > 0 or scenario.world.engine == "rotors"
-        if isinstance(control, Mishap) and control.what is MishapKind.BATTERY and not drains:
+        if isinstance(control, Mishap) and control.what is MishapKind.BATTERY and not scenario.drains_batteries:
             found.append(f'faults.{index}: kind = "battery" needs sensors.battery_hz > 0')
     return found

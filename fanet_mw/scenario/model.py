@@ -196,5 +196,9 @@ class Scenario(Section):
         return range(1, self.nodes.count + 1)
 
     @property
+    def drains_batteries(self) -> bool:
+        return self.sensors.battery_hz > 0 or self.world.engine == "rotors"
+
+    @property
     def leader(self) -> NodeId:
         return NodeId(1)

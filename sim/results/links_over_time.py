@@ -15,7 +15,7 @@ import numpy.typing as npt
 from agents.applications.traffic import sources_of, targets_of
 from emulator.channel.link_budget import heard_m
 from fanet_mw.scenario.model import Scenario
-from fanet_mw.trace import Posed, ProcessEnded, ProcessStarted, RadioFault
+from fanet_mw.trace import Posed, ProcessEnded, ProcessStarted, RadioFault, Record
 from fanet_mw.units import S
 from sim.records.record_kinds import records_of
 from sim.results.outcome import Outcome
@@ -50,8 +50,32 @@ def connectivity(scenario: Scenario) -> float:
     return float(np.mean(shares))
 
 
-OFF_AIR: Final = frozenset({"cut", "mute", "deaf", "stop", "crash"})
+_OFF_AIR: Final = frozenset({"cut", "mute", "deaf", "stop", "crash"})
 """The faults that take a UAV out of the network."""
+
+
+class Absentees:
+    """The UAVs whose process has ended, and those off the air by a fault, as records tell in their order."""
+
+    KINDS: Final = (ProcessEnded, ProcessStarted, RadioFault)
+    """The kinds of records that tell it."""
+
+    def __init__(self) -> None:
+        self.dead: set[int] = set()
+        self._faults: dict[str, int] = {}
+
+    @property
+    def off_air(self) -> set[int]:
+        return set(self._faults.values())
+
+    def take(self, record: Record) -> None:
+        if type(record) is ProcessEnded:
+            self.dead.add(record.node)
+        elif type(record) is ProcessStarted:
+            self.dead.discard(record.node)
+        elif type(record) is RadioFault and record.kind in _OFF_AIR:
+            self._faults.pop(record.label, None)
+            self._faults.update({record.label: record.node} if record.active else {})
 
 
 class LinksOverTime:
@@ -88,8 +112,7 @@ def within(at: Rows, reach_m: float) -> Flags:
 def _places(outcome: Outcome, count: int) -> list[Rows]:
     """The positions at the beginning of each second, NaN of nodes off the air; one array while nothing changes."""
     at = np.array(positions(outcome.scenario), dtype=np.float64)
-    faults: dict[str, int] = {}
-    dead: set[int] = set()
+    absent = Absentees()
     found: list[Rows] = []
     changed = True
 
@@ -98,21 +121,16 @@ def _places(outcome: Outcome, count: int) -> list[Rows]:
         while len(found) < min(count, until):
             if changed:
                 now = at.copy()
-                now[[node - 1 for node in dead | set(faults.values()) if 1 <= node <= len(at)]] = np.nan
+                now[[node - 1 for node in absent.dead | absent.off_air if 1 <= node <= len(at)]] = np.nan
             found.append(now if changed else found[-1])
             changed = False
 
-    for record in records_of(outcome.records, Posed, ProcessEnded, ProcessStarted, RadioFault):
+    for record in records_of(outcome.records, Posed, *Absentees.KINDS):
         fill(-(-record.t_ns // S))
         if type(record) is Posed:
             at[record.node - 1] = record.east_m, record.north_m, record.up_m
-        elif type(record) is ProcessEnded:
-            dead.add(record.node)
-        elif type(record) is ProcessStarted:
-            dead.discard(record.node)
-        elif type(record) is RadioFault and record.kind in OFF_AIR:
-            faults.pop(record.label, None)
-            faults.update({record.label: record.node} if record.active else {})
+        else:
+            absent.take(record)
         changed = True
     fill(count)
     return found

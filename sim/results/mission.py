@@ -25,9 +25,6 @@ from fanet_mw.trace import (
     PlacedAmong,
     PlacedInside,
     Posed,
-    ProcessEnded,
-    ProcessStarted,
-    RadioFault,
     Record,
     Refuted,
 )
@@ -35,7 +32,7 @@ from fanet_mw.units import Enu, S
 from fanet_mw.wire.survivors import is_person
 from sim.records.record_kinds import records_of
 from sim.results.coherence import Coherence, coherence
-from sim.results.links_over_time import OFF_AIR, parts
+from sim.results.links_over_time import Absentees, parts
 from sim.world.arrays import Flags, Rows, Values
 from sim.world.environment.layout import positions
 from sim.world.environment.survivors import place
@@ -261,24 +258,15 @@ def _usual(values: list[int]) -> dict[str, float]:
 
 def searching_instants(records: Iterable[Record]) -> Iterator[tuple[int, Rows, Flags]]:
     """The instants with positions, the positions of the UAVs alive then, and which of these search."""
-    dead: set[int] = set()
+    absent = Absentees()
     wrecked: set[int] = set()
     homeward: set[int] = set()
-    off_air: dict[str, int] = {}
     returning: set[int] = set()
     rows: list[tuple[float, float, float]] = []
     searching: list[bool] = []
     t_ns = 0
-    kinds = (ProcessEnded, ProcessStarted, RadioFault, MissionModeChanged, FlightModeChanged, Posed)
-    for record in records_of(records, *kinds):
-        if type(record) is ProcessEnded:
-            dead.add(record.node)
-        elif type(record) is ProcessStarted:
-            dead.discard(record.node)
-        elif type(record) is RadioFault and record.kind in OFF_AIR:
-            off_air.pop(record.label, None)
-            off_air.update({record.label: record.node} if record.active else {})
-        elif type(record) is FlightModeChanged:
+    for record in records_of(records, *Absentees.KINDS, MissionModeChanged, FlightModeChanged, Posed):
+        if type(record) is FlightModeChanged:
             wrecked |= {record.node} if record.mode == _WRECKED else set()
             returning = returning | {record.node} if record.mode == _RETURNING else returning - {record.node}
         elif type(record) is MissionModeChanged:
@@ -288,9 +276,11 @@ def searching_instants(records: Iterable[Record]) -> Iterator[tuple[int, Rows, F
                 yield t_ns, np.array(rows), np.array(searching)
                 rows, searching = [], []
             t_ns = record.t_ns
-            if record.node not in dead:
+            if record.node not in absent.dead:
                 rows.append((record.east_m, record.north_m, record.up_m))
-                searching.append(record.node not in homeward | wrecked | returning | set(off_air.values()))
+                searching.append(record.node not in homeward | wrecked | returning | absent.off_air)
+        else:
+            absent.take(record)
     if rows:
         yield t_ns, np.array(rows), np.array(searching)
 

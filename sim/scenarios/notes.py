@@ -34,8 +34,7 @@ _SIGMAS: Final = 2.0
 def notes(scenario: Scenario) -> list[str]:
     kinds = (
         _after_the_end, _without_effect, _without_place, _still_waves, _beyond_the_vehicle, _close_pads, _low_ceiling,
-        _odd_band,
-        _guessed,
+        _odd_band, _guessed,
     )  # fmt: skip
     return [note for kind in kinds for note in kind(scenario)]
 
@@ -163,7 +162,7 @@ def _close_pads(scenario: Scenario) -> Iterator[str]:
 
 
 def _low_ceiling(scenario: Scenario) -> Iterator[str]:
-    """A ceiling that leaves UAVs which cannot know of each other no heights of their own."""
+    """A ceiling that leaves UAVs that cannot know of each other no heights of their own, or above which some return."""
     mission, mobility, altitude_m = scenario.mission, scenario.mobility, scenario.nodes.altitude_m
     if mission.search == "none":
         return

@@ -136,11 +136,8 @@ class WorldActor(Actor):
         self._guidance = Guidance(starts, scenario, surface_m=solids.surface_m)
         for node, sent in sorted(flight.setpoints.items()) if flight else ():
             self._guidance.obey(node, sent, at=self._engine.positions()[node - 1], t_s=sent.t_ns / S)
-        drained = scenario.sensors.battery_hz > 0 or scenario.world.engine == "rotors"
-        self._drain = BatteryDrain(scenario) if drained else None
-        if self._drain is not None and flight is not None:
-            for node, charge in flight.charges.items():
-                self._drain.batteries.charge[node - 1] = charge
+        charges = {} if flight is None else flight.charges
+        self._drain = BatteryDrain(scenario, charges) if scenario.drains_batteries else None
         survivors = Survivors(scenario, solids.ground_m)
         self._mishaps = Mishaps(scenario)
         gps = GpsReceiver(scenario, self._mishaps)

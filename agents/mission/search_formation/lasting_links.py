@@ -7,7 +7,7 @@
     that last join all UAVs, and then only to shorten ways. If no try joins them, the first assignment remains.
 
 A node can do nothing else meanwhile, so pairs are drawn of which one at least may fly to the other's goal, and links
-are bit masks, one for each UAV: 45 are joined within 40 ms, and given up after 100 ms.
+are bit masks, one for each UAV: 45 are mostly joined within 40 ms (`tests/benchmarks/keeping_together.py`).
 """
 
 import math
@@ -46,11 +46,11 @@ def keep_together(
     ways = [[start.horizontal_to(goal) for goal in goals] for start in starts]
     costs = [[way * way + dearer_m2(uav, goal) for goal, way in enumerate(row)] for uav, row in enumerate(ways)]
     least = assign(costs)
-    if not _Links(starts, goals, least, LASTING * reach_m).may_join:
+    links = _Links(starts, goals, list(least), LASTING * reach_m)
+    if not links.may_join:
         return least, False
     longest_m = _LONGEST * max((ways[uav][goal] for uav, goal in enumerate(least)), default=0.0)
     allowed = [[goal for goal, way in enumerate(row) if way <= longest_m] for row in ways]
-    links = _Links(starts, goals, list(least), LASTING * reach_m)
     return (links.chosen, True) if _join(links, costs, allowed, random) else (least, False)
 
 

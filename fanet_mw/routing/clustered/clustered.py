@@ -171,7 +171,7 @@ class Clustered(RoutingProtocol):
         missed = parts.one_way.failed(status)
         if missed is not None and status.outcome is TxOutcome.RETRY_LIMIT:
             self._send_one_way(missed, start_ns=now_ns + self._lead_ns, now_ns=now_ns)
-        elif missed is not None:
+        elif missed is not None:  # its way is still the best known, and would meet the same full queue
             parts.floods.contend(missed, due_ns=now_ns, now_ns=now_ns)
         failed = parts.uplink.on_status(status)
         if failed is None:

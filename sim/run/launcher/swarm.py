@@ -79,9 +79,12 @@ class Deaths:
         self.ended.append((name, exit_code))
         self.records.append(ProcessEnded(now_ns, node, name, exit_code))
 
+    def has_died(self, name: str) -> bool:
+        return any(ended == name for ended, _ in self.ended)
+
     def note_start(self, name: str, *, node: int, now_ns: int) -> None:
         """A process was started again, perhaps one that has died."""
-        if any(ended == name for ended, _ in self.ended):
+        if self.has_died(name):
             self.records.append(ProcessStarted(now_ns, node, name))
 
     def grant_respawn(self, name: str) -> bool:
@@ -405,7 +408,7 @@ class SwarmRun:
             if not name.startswith("agent-") or self._clock is None:
                 self.abort(f"{error}; the run cannot go on without it", broken=True)
                 return
-            if all(ended != name for ended, _ in self._deaths.ended):  # it was stopped as planned
+            if not self._deaths.has_died(name):  # it was stopped as planned
                 self._deaths.note(name, -signal.SIGKILL, node=_node_of(name), now_ns=self._now_ns())
             self._tell(f"{error}; the others carry on")
 

@@ -5,6 +5,7 @@ and climb rate (`rotors/power.py`), from a table over both; acceleration costs n
 for its avionics only.
 """
 
+from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
@@ -60,11 +61,13 @@ class Batteries:
 class BatteryDrain:
     """The batteries of all UAVs, and the power that empties them."""
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, charges: Mapping[int, float] = {}) -> None:
+        """`charges`: those of some nodes in an earlier part of the flight; all others are drawn."""
         world = scenario.world
         self._vehicle = VEHICLES[world.vehicle]
         random = stream(scenario.seed, "charge")
-        charge = np.array([random.uniform(*world.charge) for _ in scenario.uav_ids])
+        drawn = {node: random.uniform(*world.charge) for node in scenario.uav_ids}
+        charge = np.array([charges.get(node, full) for node, full in drawn.items()])
         self.batteries = Batteries(self._vehicle.battery, charge)
         self._table = power_table(self._vehicle)
 

@@ -198,8 +198,8 @@ class ClockKeeper:
 
 
 def _require_near(passed_s: float, *, most_s: float) -> None:
-    """Raise BusError if by the clock of this machine so much has passed since swarm instant 0 as cannot be: the keeper
-    tells of it shortly ahead, and it was at most `most_s` ago (infinite: not known).
+    """Raise BusError if this machine's clock gives an impossible time since swarm instant 0: the keeper tells of that
+    instant shortly ahead, and it was at most `most_s` ago (infinite: not known).
     """
     behind_s, ahead_s = -passed_s - _START_DELAY_NS / S, passed_s - most_s
     for off_s, side in ((behind_s, "behind"), (ahead_s if math.isfinite(most_s) else 0.0, "ahead of")):

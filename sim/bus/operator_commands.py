@@ -71,7 +71,9 @@ def change(endpoint: str, swarm: str | None, control: Control, *, zenoh_config: 
 
 
 def impossible(control: Control, tree: Mapping[str, Any], swarm: str) -> str | None:
-    """Why a change can do nothing in a swarm with this scenario, as in a file; None if it can, or nobody says."""
+    """Why a change has no effect in a swarm with this scenario; None if it has one, or the scenario is not known. The
+    rules are those for the faults in a scenario's file.
+    """
     count = tree.get("nodes", {}).get("count")
     if not isinstance(count, int) or isinstance(control, Restore):
         return None

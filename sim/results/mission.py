@@ -152,8 +152,8 @@ class Confirmations:
         return [one for one in self._first() if self.error_m(one) > MISTAKEN_M]
 
     def persons(self) -> tuple[dict[int, Confirmed], int]:
-        """The finds of persons without a phone, each by the survivor it is of, the nearest pairs first; and how many
-        others there are, of nobody or of somebody of whom there is another one.
+        """The finds of persons without a phone by survivor, the nearest pairs first, and the number of all other such
+        finds: false ones, and further ones of the same survivor.
         """
         finds = {number: held[0] for number, held in sorted(self._held.items()) if held and is_person(number)}
         near = sorted(
@@ -169,7 +169,7 @@ class Confirmations:
         return {survivor: finds[number] for survivor, number in of.items()}, len(finds) - len(of)
 
     def found_ns(self) -> dict[int, int]:
-        """When each survivor was found, by phone or as a person, or there by another's phone."""
+        """When each survivor was found: by phone, as a person without one, or at first under another's phone."""
         persons, _ = self.persons()
         found = {survivor: self._as_ns.get(find.survivor, find.t_ns) for survivor, find in persons.items()}
         for one in self.right():

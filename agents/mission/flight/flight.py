@@ -14,8 +14,8 @@ from agents.mission.search_formation.roll_call import MUTE_LEVELS, RollCall
 from fanet_mw.units import STILL, Enu, NodeId
 
 _MUTE_LEVEL_M: Final = 8.0
-"""A mute UAV keeps its place above those who fly home, its level times this or as much as the ceiling leaves: others
-fly where it should be, because they take it for lost, and two levels should not be in each other's way."""
+"""A mute UAV flies above those who fly home, by this for each level, or by less if the ceiling is too low: others fly
+where it should be, because they take it for lost, and two levels should not be in each other's way."""
 CEILING_MARGIN_M: Final = 4.0
 """Goals end so far below the ceiling: heights are wrong by 2 m (rescue, seed 1: 122.2 m where 120 was wanted)."""
 _PASS_M: Final = 18.0

@@ -51,8 +51,8 @@ _OFF_M: Final = 0.4
 _LOW_OVER_PAD_M: Final = 2.0
 """Lower than this over its pad a UAV waits until it is within `_OFF_M` of it, and then sinks straight down."""
 _NO_FIX_NS: Final = 1_500 * MS
-"""A UAV does not know its place once it has had no position for so long, nor in the time of so many: by then its flight
-controller holds it, because no velocity is commanded without a position."""
+"""A UAV does not know its place after so long without a position, or after `_NO_FIXES` intervals of positions if that
+is longer: by then its flight controller holds it, because no velocity is commanded without a position."""
 _NO_FIXES: Final = 3
 
 
@@ -125,7 +125,7 @@ class ReturnHome:
         self._home = self._home._replace(east=here.east, north=here.north)
 
     def on_pad(self, offset: Enu, now_ns: int) -> None:
-        """The camera sees the marker of this UAV's pad at this offset: there is the base, by its receiver of now."""
+        """The camera sees the marker of this UAV's pad at this offset from where its receiver says it is."""
         if not self.leaves:
             return
         seen = self._own_motion.position.plus(offset)

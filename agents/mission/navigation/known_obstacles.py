@@ -93,7 +93,7 @@ class KnownObstacles:
     def radar(self, echoes: Sequence[Echo], *, at: Enu, velocity: Enu, neighbors: Sequence[Enu], now_ns: int) -> None:
         """A scan of the radar; `neighbors` are the present places of the neighbors that are received."""
         self._movers = [mover for mover in self._movers if now_ns - mover.at_ns < _MOVER_NS // 2]
-        for cells in (self._echoes, self._taken):  # of hours of false echoes each fix looks at all that are kept
+        for cells in (self._echoes, self._taken):  # each fix looks at all echoes, and false ones would pile up
             for cell in [cell for cell, echoed in cells.items() if echoed.until_ns <= now_ns]:
                 del cells[cell]
         for echo in echoes:

@@ -6,7 +6,7 @@
     also if that is for the worse (simulated annealing; Kirkpatrick, Gelatt and Vecchi, Science 220, 1983), until links
     that last join all UAVs, and then only to shorten ways. If no try joins them, the first assignment remains.
 
-A node can do nothing else meanwhile, so pairs are drawn of which one at least may fly to the other's goal, and links
+A node can do nothing else meanwhile, so of each pair that is drawn one may always fly to the other's goal, and links
 are bit masks, one for each UAV: 45 are mostly joined within 40 ms (`tests/benchmarks/keeping_together.py`).
 """
 
@@ -39,9 +39,9 @@ def keep_together(
     reach_m: float,
     random: Callable[[], float],
 ) -> tuple[list[int], bool]:
-    """The goal of each UAV, of no fewer goals than UAVs, and whether links that last join all UAVs; if not, the goals
-    are those of the least sum. `dearer_m2`: what it costs that a UAV flies to a goal, beside the square of its way
-    there [m2].
+    """The goal of each UAV (there are at least as many goals as UAVs), and whether links that last join all UAVs; if
+    not, the goals are those of the least sum. `dearer_m2`: the extra cost of a UAV at a goal [m2], added to its squared
+    way there.
     """
     ways = [[start.horizontal_to(goal) for goal in goals] for start in starts]
     costs = [[way * way + dearer_m2(uav, goal) for goal, way in enumerate(row)] for uav, row in enumerate(ways)]

@@ -62,7 +62,7 @@ class BatteryDrain:
     """The batteries of all UAVs, and the power that empties them."""
 
     def __init__(self, scenario: Scenario, charges: Mapping[int, float] = {}) -> None:
-        """`charges`: those of some nodes in an earlier part of the flight; all others are drawn."""
+        """`charges`: what sensors told last before the world was started again; those of all other nodes are drawn."""
         world = scenario.world
         self._vehicle = VEHICLES[world.vehicle]
         random = stream(scenario.seed, "charge")

@@ -676,4 +676,5 @@ def test_telemetry_that_the_network_refused_is_as_frequent_again_once_it_is_take
         status = Status(1, Fate.REFUSED, bench.now_ns, interval_ns=least_ns)
         control.on_status(status, bench.now_ns)
     assert intervals_s(100)[-1] >= 16 * usual_s
+    assert intervals_s(125)[-1] >= 8 * usual_s, "two minutes after the refusal it is tried only twice as often"
     assert intervals_s(700)[-1] == usual_s

@@ -39,11 +39,13 @@ class Flight:
         home: Enu = HOME,
         lost_link_s: float = 0.0,
         post_m: Sequence[float] = (),
+        ceiling_m: float = 120.0,
     ) -> None:
         keys = {
             "nodes.count": 20, "nodes.altitude_m": 65, "mission.survivors": 3, "mission.search": "lines",
             "mobility.model": "onboard", "world.area_m": 1000, "radio.range_m": 250, "sensors.battery_hz": 1,
             "sensors.camera_hz": 2, "mission.lost_link_s": lost_link_s, "ground.at_m": post_m,
+            "mission.ceiling_m": ceiling_m,
         }  # fmt: skip
         scenario = make_scenario(**keys)
         self.outbox = Outbox()
@@ -122,6 +124,14 @@ def test_who_has_just_enough_left_says_so_flies_home_and_lands(make_scenario: Ca
     assert flight.outbox.course is not None, "a setpoint may be lost: the landing is commanded again at each fix"
     assert min(flight.charges[:3]) > 50
     assert flight.charges[-1] == 0
+
+
+def test_who_flies_home_stays_below_the_ceiling(make_scenario: Callable[..., Scenario]) -> None:
+    flight = Flight(make_scenario, ceiling_m=80)
+    flight.fly(40, charge=lambda _: 0.9)
+    flight.fly(10, charge=lambda _: 0.1)
+    assert flight.modes[-1] == "return"
+    assert flight.at.up < 80, "18 m above the lanes would be 83 m"
 
 
 def test_who_hears_nobody_any_more_flies_home_and_lands(make_scenario: Callable[..., Scenario]) -> None:

@@ -17,6 +17,7 @@ from fanet_mw.gateway.routing import Link, hostile
 from fanet_mw.gateway.signing import Signing, read_key
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import START_PATIENCE_S, ClockListener, SwarmClock
+from fanet_mw.hosts.readiness import tell_ready
 from fanet_mw.hosts.timebase import THIS_MACHINE
 from fanet_mw.mavlink import GATEWAY_COMPONENT, common
 from fanet_mw.scenario.fingerprint import told_by
@@ -151,6 +152,7 @@ class Gateway:
             way = "from the taps" if self._post is None else f"over the air by node {self._post}"
             self._tell(f"MAVLink {way} on " + ", ".join(str(connection.address) for _, connection in self._doors[:8])
                        + (f" and {len(self._doors) - 8} more" if len(self._doors) > 8 else ""))  # fmt: skip
+            tell_ready()
             await self._watch(over, listener, clock)
         finally:
             clock.cancel()

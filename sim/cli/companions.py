@@ -5,6 +5,7 @@ They are processes of their own, so that the launcher, whose router all frames p
 
 import contextlib
 import os
+import select
 import signal
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, Self
 
 from fanet_mw.errors import HostError
+from fanet_mw.hosts.readiness import VARIABLE
 
 if TYPE_CHECKING:
     from fanet_mw.hosts.realtime import SwarmAddress
@@ -32,7 +34,8 @@ class Companions:
         self._commands = commands
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._running: list[subprocess.Popen[bytes]] = []
-        self._checked = False
+        self._unready: dict[int, int] = {}
+        """Who has not said that it listens: the end of its pipe, by its index among the commands."""
         self.failed: dict[str, str] = {}
         """How each ended that did not end in good order, by its first word; known when all were ended."""
 
@@ -53,18 +56,27 @@ class Companions:
             # -P: a file where the launcher was called, say attrs.py, is no module; they find what this process finds
             command = [sys.executable, "-P", "-m", "fanet_mw", *words, *where]
             found = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+            hears, tells = os.pipe()
+            self._unready[len(self._running)] = hears
             self._running.append(
                 subprocess.Popen(  # noqa: S603  (a command of fanet-mw)
-                    command, env=found, start_new_session=True, stdin=subprocess.DEVNULL, preexec_fn=_give_way
+                    command, env={**found, VARIABLE: str(tells)}, pass_fds=(tells,), start_new_session=True,
+                    stdin=subprocess.DEVNULL, preexec_fn=_give_way,
                 )
-            )
+            )  # fmt: skip
+            os.close(tells)
 
-    def check(self) -> None:
-        """Raise HostError if one has failed by the first call, as the swarm takes off; later the flight goes before."""
-        for words, process in zip(self._commands, () if self._checked else self._running, strict=False):
-            if process.poll():
-                raise HostError(f"fanet {' '.join(words)}: ended with code {process.returncode}, so nobody takes off")
-        self._checked = True
+    def awaited(self) -> list[str]:
+        """Those that do not listen yet, for which the swarm waits; raises HostError for one that has failed."""
+        for index, pipe in [*self._unready.items()]:
+            if not select.select([pipe], [], [], 0)[0]:
+                continue
+            listens = os.read(pipe, 1)
+            os.close(self._unready.pop(index))
+            if not listens and (code := self._running[index].wait()):
+                words = " ".join(self._commands[index])
+                raise HostError(f"fanet {words}: ended with code {code}, so nobody takes off")
+        return [f"fanet {self._commands[index][0]}" for index in self._unready]
 
     def end(self) -> None:
         """End them; a recording closes its file first."""
@@ -81,6 +93,9 @@ class Companions:
             if code and (words[0] == "record" or code not in _TERMINATED):  # a recording must end by itself
                 self.failed[words[0]] = described(code)
         self._running.clear()
+        for pipe in self._unready.values():
+            os.close(pipe)
+        self._unready.clear()
         if self._folder is not None:
             self._folder.cleanup()
 

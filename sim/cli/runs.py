@@ -162,11 +162,6 @@ def launch(
             Companions(beside) as companions,
             _watched(chosen, bar=not output.json) as tell,
         ):
-
-            def on_progress(progress: "Progress") -> None:
-                companions.check()
-                tell(progress)
-
             outcome = asyncio.run(
                 run(
                     chosen,
@@ -179,10 +174,11 @@ def launch(
                     zenoh_config=zenoh_config,
                     emulator_options={"pcap": output.capture_path(), "receptions": output.pcap_receptions},
                     spool_folder=output.out,
-                    on_progress=on_progress,
+                    on_progress=tell,
                     on_event=_say,
                     leads=leads,
                     on_started=lambda run: companions.start(run.address, chosen),
+                    awaited=companions.awaited,
                 )
             )
         failed = {name: f"fanet {name} ended with {how}" for name, how in companions.failed.items()}

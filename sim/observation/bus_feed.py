@@ -29,6 +29,7 @@ from fanet_mw.bus.topics import Topics, node_of, node_of_tap
 from fanet_mw.errors import ConfigError, FanetError, MalformedFrameError
 from fanet_mw.hosts.bus import Bus, config_of
 from fanet_mw.hosts.clock import SwarmClock
+from fanet_mw.hosts.readiness import tell_ready
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.scenario.fingerprint import told_by
 from fanet_mw.trace import Record
@@ -109,6 +110,7 @@ class BusFeed:
             self._waits_until_s = time.monotonic() + _STANDING_S
             self.bus.ask(self.names.standing, self._stand)
         self._ask_clock()
+        tell_ready()
 
     def pump(self, observer: Observer) -> int:
         """Tell an observer what has come; returns the number of puts. Raises BusError when the router is gone."""

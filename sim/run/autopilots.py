@@ -12,6 +12,7 @@ from fanet_mw.gateway.gateway import per_uav
 from fanet_mw.geodesy import Geodetic
 from fanet_mw.hosts.clock import START_PATIENCE_S, ClockListener
 from fanet_mw.hosts.loop import heeding
+from fanet_mw.hosts.readiness import tell_ready
 from fanet_mw.scenario.fingerprint import fingerprint
 from fanet_mw.units import NodeId
 from sim.observation.bus_feed import BusFeed
@@ -58,6 +59,7 @@ async def run(
             if not await _all_heard(autopilots, over, serving, tell):
                 return 0
             bus.announce(names.alive(WORLD, fingerprint=fingerprint(scenario), instance="autopilots"))
+            tell_ready()
             clock = await listener.running(timeout_s=START_PATIENCE_S)
             while not over.is_set() and not listener.stopped.is_set() and not serving.done():
                 if clock.wait_s(clock.ends_ns or scenario.duration_ns) <= 0:

@@ -26,7 +26,7 @@ def test_a_launcher_that_is_killed_leaves_no_process_and_a_whole_recording(tmp_p
         assert process.stderr is not None
         while "processes up" not in (line := process.stderr.readline()):
             assert line, "the swarm did not come up"
-        time.sleep(5)
+        time.sleep(2)
         assert len(beside(tmp_path.name)) == 2
         process.kill()
     end_s = time.monotonic() + 30
@@ -48,7 +48,12 @@ def beside(swarm: str) -> list[str]:
     return [" ".join(one) for one in commands if swarm in one and {"view", "record"} & set(one) and "launch" not in one]
 
 
-def test_a_swarm_of_processes_is_recorded_beside_it(tmp_path: Path) -> None:
+def test_a_swarm_of_processes_is_recorded_beside_it_from_its_first_moment(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its recorder takes seconds longer to start than everything else, as beside other work."""
+    (tmp_path / "sitecustomize.py").write_text("import sys, time\n'record' in sys.orig_argv and time.sleep(3)\n")
+    monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
     out = tmp_path / "run"
     words = [
         "launch",
@@ -76,7 +81,7 @@ def test_a_swarm_of_processes_is_recorded_beside_it(tmp_path: Path) -> None:
         for one in message.transforms
     }
     both = posed.keys() & seen.keys()
-    assert len(both) >= 0.5 * len(posed)  # a busy machine is late to listen
+    assert len(both) >= 0.9 * len(posed)  # on a busy machine a put may be lost
     for key in both:
         assert seen[key] == pytest.approx(posed[key], abs=0.006)
     assert any("head of cluster" in message.message for topic, _, message in found if topic == "/log")

@@ -15,13 +15,13 @@ import signal
 import socket
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
 from fanet_mw.bus import codecs
-from fanet_mw.bus.messages import ClockRequest
+from fanet_mw.bus.messages import ClockEpoch, ClockRequest
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError, HostError, MalformedFrameError
 from fanet_mw.hosts import interrupts
@@ -102,6 +102,8 @@ _GRACE_S: Final = 5.0
 _LAST_WORDS_S: Final = 1.0
 """After the end of all processes: some last messages may still be on the bus."""
 _PROGRESS_S: Final = 0.25
+_LISTENS_S: Final = 0.05
+"""The interval at which it is asked who does not listen yet."""
 _SILENT_S: Final = 4
 """A process that has sent no report for so long is named; it sends one each second."""
 _SILENT_TIMES: Final = 2
@@ -129,11 +131,14 @@ class SwarmRun:
         spool_folder: Path | None = None,
         slow_down_to: float | None = None,
         leads: Leads | None = None,
+        awaited: Callable[[], Sequence[str]] = tuple,
     ) -> None:
         scenario, self.address = services.scenario, services.address
         names = Topics(self.address.swarm)
         self._services = services
         self._leads = leads
+        self._awaited = awaited
+        """Who else must be there before the clock starts, by name: the programs that listen to this swarm."""
         self._tell = tell
         self._collector = Collector(scenario, bus.subscribe, names, now_ns=time.monotonic_ns, folder=spool_folder)
         bus.answer(names.standing, self._collector.standing)
@@ -249,11 +254,14 @@ class SwarmRun:
 
     async def _start_clock(self, began: float) -> float:
         """Wait for all processes, then start the clock; returns how long that took [s]."""
-        start = asyncio.ensure_future(self._keeper.start(timeout_s=READY_TIMEOUT_S))
+        start = asyncio.ensure_future(self._start_once_heard())
         over = asyncio.ensure_future(self._over.wait())
         while not await _any_done(start, over, timeout_s=WORD_EVERY_S):
             presence, expected = self._keeper.presence, expected_names(self._services.scenario)
-            self._tell(f"waiting for {len(presence.missing())} of {len(expected)}: {presence.sentence()}")
+            if presence.complete():
+                self._tell(f"waiting for {', '.join(self._awaited())}")
+            else:
+                self._tell(f"waiting for {len(presence.missing())} of {len(expected)}: {presence.sentence()}")
         over.cancel()
         if not start.done():
             start.cancel()
@@ -264,6 +272,15 @@ class SwarmRun:
         ready_s = time.monotonic() - began
         self._tell(f"{len(self.processes.names())} processes up after {ready_s:.1f} s")
         return ready_s
+
+    async def _start_once_heard(self) -> ClockEpoch:
+        """Start the clock when those beside the swarm listen, who then miss nothing, and all processes are there."""
+        until_s = time.monotonic() + READY_TIMEOUT_S
+        while names := self._awaited():
+            if time.monotonic() > until_s:
+                raise BusError(f"{', '.join(names)} did not listen within {READY_TIMEOUT_S:g} s")
+            await asyncio.sleep(_LISTENS_S)
+        return await self._keeper.start(timeout_s=READY_TIMEOUT_S)
 
     async def _follow(self, on_progress: OnProgress) -> None:
         assert self._clock is not None, "the clock was started"
@@ -458,12 +475,14 @@ async def launch(
     leave_out: Collection[int] = (),
     heed_signals: bool = True,
     leads: Leads | None = None,
+    awaited: Callable[[], Sequence[str]] = tuple,
 ) -> Outcome:
     """Run a scenario as real processes; `on_started` receives the swarm while it runs.
 
     `slow_down_to`: the scale to which the clock may slow down while the machine cannot keep up. Nodes of `leave_out`
     are joined by a program of the user's. Without `own_world` a foreign world declares the liveliness token of `world`.
-    `leads`: what was chosen for the scenario, for the outcome. `zenoh_config`: a file for all processes, or a folder
+    `leads`: what was chosen for the scenario, for the outcome. `awaited`: those for whom the clock waits, beside the
+    swarm's own processes, as long as it names any. `zenoh_config`: a file for all processes, or a folder
     with one for each. Raises BusError when the swarm does not come up, ConfigError when the world is impossible or a
     limit too low, HostError when the program launches when it is imported, and KeyboardInterrupt for a signal before
     there is anything to report.
@@ -483,7 +502,7 @@ async def launch(
         services = Services(scenario, address, own_world, frozenset(leave_out), emulator_options or {})
         run = SwarmRun(
             services, bus, respawn=respawn, tell=on_event, spool_folder=spool_folder, slow_down_to=slow_down_to,
-            leads=leads,
+            leads=leads, awaited=awaited,
         )  # fmt: skip
         with heeding(run.interrupt) if heed_signals else contextlib.nullcontext():
             return await run.run(on_progress, on_started)

@@ -1,5 +1,6 @@
 """Programs beside a swarm that is launched."""
 
+import os
 import signal
 import subprocess
 from pathlib import Path
@@ -25,17 +26,23 @@ def test_a_file_in_the_folder_of_whoever_launches_is_no_module_of_theirs(
     assert "--nonsense" in capfd.readouterr().err
 
 
-def test_one_that_fails_as_the_swarm_comes_up_keeps_it_on_the_ground_and_one_that_ends_later_does_not() -> None:
+def test_one_that_fails_before_it_listens_keeps_the_swarm_on_the_ground() -> None:
     with Companions([["record", "x.mcap", "--nonsense"]]) as companions:
         companions.start(SwarmAddress("tcp/127.0.0.1:1", "s"), catalog.find("quick"))
+        assert companions.awaited() == ["fanet record"]
         companions._running[0].wait(60)
         with pytest.raises(HostError, match=r"fanet record x\.mcap --nonsense: ended with code 2, so nobody takes off"):
-            companions.check()
-    with Companions([["record", "x.mcap", "--nonsense"]]) as companions:
-        companions.check()
-        companions.start(SwarmAddress("tcp/127.0.0.1:1", "s"), catalog.find("quick"))
+            companions.awaited()
+
+
+def test_one_that_ends_after_it_has_listened_does_not() -> None:
+    with Companions([["view"]]) as companions:
+        hears, tells = os.pipe()
+        companions._unready[0] = hears
+        companions._running.append(subprocess.Popen(["bash", "-c", f"echo >&{tells}; exit 1"], pass_fds=(tells,)))
+        os.close(tells)
         companions._running[0].wait(60)
-        companions.check()
+        assert companions.awaited() == []
 
 
 @pytest.mark.parametrize(

@@ -1,14 +1,8 @@
 """Carries the messages of a node's applications: what they send goes into packets, and what arrives goes to listeners.
 
-plain MAVLink frames to one node or all          -> one packet, unchanged
-bytes to a port, a set of nodes, or confirmed    -> pieces and receipts (`fanet_mw.delivery`)
-
-Applications are told what has become of their messages:
-
-    a packet is announced, transmitted or dropped    ->  `Node.watch`, for packets that are watched
-    a message is acknowledged, or has expired        ->  `Sender.told`
-
-That is after the input was handled, so that none is called while it is calling itself.
+Plain MAVLink frames to one node or all are one packet, unchanged; all else goes in pieces with receipts
+(`fanet_mw.delivery`). Applications are told what has become of their messages after the input was handled, so that none
+is called while it is calling itself.
 """
 
 from collections import Counter, deque

@@ -1,15 +1,9 @@
 """A capture of what goes over the air: pcap with nanoseconds, radiotap, 802.11, LLC/SNAP, IPv4, UDP, the frame.
 
 One record per transmission attempt, data and ACKs, stamped with its first bit; on request one per frame handed to a
-station, stamped with its last bit. Instants are swarm time plus the epoch.
-
-    pcap        libpcap's file format, magic 0xA1B23C4D, link type 127 (IEEE802_11_RADIOTAP)
-    radiotap    radiotap.org: flags, rate, channel, signal or power, antenna, data retries
-    802.11      802.11-2020, 9.2.4 and 9.3.2.1: data frames of an independent BSS, 24 bytes and FCS; 9.3.1.4: ACK
-    LLC/SNAP    RFC 1042;  IPv4 RFC 791;  UDP RFC 768 (port 14550, MAVLink's); checksums RFC 1071
-
-Addresses are made of node ids: 02:FA:4E:45:hi:lo and 10.0.hi.lo. Not modeled: beacons of the IBSS, ARP, fragmentation,
-frames overheard by other stations, copies that were lost.
+station, stamped with its last bit. Layouts: libpcap (link type 127), radiotap.org, 802.11-2020 (9.2.4, 9.3.2.1,
+9.3.1.4), RFC 1042, 791, 768 and 1071. Addresses are made of node ids: 02:FA:4E:45:hi:lo and 10.0.hi.lo. Not modeled:
+beacons of the IBSS, ARP, fragmentation, frames overheard by other stations, copies that were lost.
 """
 
 import struct

@@ -1,16 +1,9 @@
 """The application contract: what a UAV does besides the network itself is done by applications, several on one node.
 
-    start(port, now)       once, first; through the port it sends, flies and records from then on
-    on_message(message, now)   a message for this node of a kind that the application listens to
-    on_status(status, now)     what has become of a message that it has sent
-    on_fix, on_sensor, on_hello    readings of the vehicle's receivers, hellos of neighbors
-    wake(now)              at or after the instant that `next_wake_ns()` has returned
-    report()               counters, at any time
-
 An application is sans-IO, as an actor is: it never sleeps, reads a clock, opens a socket or starts a thread, and
 instants never decrease. The same object therefore runs in virtual time, over Zenoh and on a real radio.
-`next_wake_ns()` is called after each of these calls. If `on_message` or `on_hello` raises `MalformedFrameError`, the
-input is counted as malformed; any other exception ends the node.
+`next_wake_ns()` is called after each other call. If `on_message` or `on_hello` raises `MalformedFrameError`, the input
+is counted as malformed; any other exception ends the node.
 """
 
 from collections.abc import Collection, Mapping

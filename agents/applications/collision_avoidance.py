@@ -1,18 +1,8 @@
 """The application that avoids collisions: it floods collision warnings, obeys those of others, and climbs or descends.
 
-While the UAV avoids another one, the application objects to courses of other applications. The UAVs of a planned search
-avoid each other by their velocities instead (`agents/mission/flight/`).
-
-With which UAVs one UAV is in conflict, whom it warns, and how it flies until the conflict is over (`ConflictMonitor`):
-
-    own fixes, others' hellos     -> the closest approach is too near and soon -> warn the other UAV, change height
-    a warning that names this UAV -> the same, even if no hello of the other UAV is received
-    far enough apart, sideways    -> back to the course
-    still side by side after long -> the one with the higher id flies to the middle of the area
-    one stands at the geofence    -> it flies back towards the middle for a while, lower ids first
-
 Of two UAVs the one with the lower id goes one level up, the other one down, so that a warning need not state a
-direction. Not modeled: turns that the other UAV has planned, and conflicts that the change of height causes.
+direction. The UAVs of a planned search avoid each other by their velocities instead (`agents/mission/flight/`). Not
+modeled: turns that the other UAV has planned, and conflicts that the change of height causes.
 """
 
 import math

@@ -2,9 +2,8 @@
 
     host: true time  |  own clock (`local_clock`)  |  swarm time as this node believes it (`swarm_time`)  |  UAV
 
-Stamps of the host's messages are read on the node's own clock, to its resolution, and converted to swarm time; requests
-and trace records go back to true time. The swarm time that the UAV is given never decreases. Until a node has learned
-swarm time it receives no schedules, and contends for the channel.
+The swarm time that the UAV is given never decreases. Until a node has learned it, the node receives no schedules, and
+contends for the channel.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -1,13 +1,7 @@
-"""The flight of one UAV as its operator commands it: modes, and the course that each of them flies.
+"""The flight of one UAV as its operator commands it: PX4's modes, and the course that each of them flies.
 
-    mission, no upload   the swarm's own task flies; nothing of the operator's
-    mission, uploaded    item by item (`mission_flight.py`)
-    take-off, guided     to a place, then hold
-    return               up to the height of returns, over home or the nearest rally point, down
-    land                 down where it is; disarmed once it stands
-    hold                 where it is
-
-While it commands, the pilot objects to courses of other applications, but for those that avoid a collision.
+In the mode of missions without an upload the swarm's own task flies, and nothing of the operator's. While it commands,
+the pilot objects to courses of other applications, but for those that avoid a collision.
 """
 
 import math

@@ -1,14 +1,7 @@
 """The planned search at one UAV: it keeps its lane, reports phones, bids for survivors, responds, and confirms.
 
-    plan received       -> a lane: its place at each instant of swarm time                      formation
-    phones in reach     -> reports: flooded, and passed from neighbor to neighbor in hellos     finding.phone_reception
-    enough reporters    -> an auction; winners leave their lanes as far as the formation allows tasking
-    too few reporters   -> the auction sends a UAV that has not reported, for another bearing   tasking
-    nobody seen, ears   -> a UAV with microphones goes down to listen                           tasking.voice_descent
-    seen at close range -> confirmed, announced; responders return to their lanes               finding.announcing
-    contradicted later  -> refuted, announced; reported and bid for as before the confirmation  finding.refutation
-
-All that a UAV knows it has sensed itself or received over the air. At each position fix it chooses a velocity (flight).
+It wires the parts together; docs/explanation/search.md says who decides what. All that a UAV knows it has sensed itself
+or received over the air. At each position fix it chooses a velocity (`flight`).
 """
 
 import math

@@ -3,22 +3,13 @@
 DBPSK     1/2 exp(-Eb/N0)                                               Proakis, Digital Communications, 4th ed., 5.2.8
 DQPSK     (1+sqrt2)/sqrt(8 pi sqrt2 x) exp(-(2-sqrt2) x), x = Eb/N0        (tight approximation of the same section)
 CCK       biorthogonal signalling of 4 (5.5) or 8 (11) dimensions times a DQPSK rotation, per 8-chip symbol (5.2.2)
+OFDM      after Viterbi the union bound over the first terms of the distance spectrum, each bounded by D^d,
+          D = sqrt(4 p (1 - p)) (Pei and Henderson, 2010), or the tables of ns-3.44 (docs/explanation/channel.md)
 
-The SINR is that in the 22 MHz channel. Values are logarithms of the success probability of one bit, by SINR in dB.
-
-OFDM, 6-54 Mb/s: the NIST model of Pei and Henderson (2010), and tables.
-
-    uncoded       BPSK, QPSK, 16-QAM, 64-QAM with Gray mapping; SINR over the 20 MHz channel is that of a subcarrier
-    after Viterbi union bound over the first terms of the distance spectrum, each bounded by D^d, D = sqrt(4 p (1 - p))
-
-G. Pei, T. Henderson, "Validation of OFDM error rate model in ns-3", 2010. Hard decisions: receivers with soft ones are
-up to 2 dB better. Not modeled: frequency-selective fading, channel estimation, phase noise, pilots and guard interval.
-
-The tables are those of link simulations that ns-3.44 has by default (R. Patidar, S. Roy, T. R. Henderson, A.
-Chandramohan, "Link-to-system mapping for ns-3 Wi-Fi OFDM error models", WNS3 2017): frame error rates over SINR for
-frames of 32 and of 1,458 bytes, soft decisions, AWGN. Other lengths follow as 1 - (1 - PER)^(length / table's length),
-by the table of short frames below 400 bytes. There is none for 9 Mb/s: as in ns-3 the first term of its union bound
-stands there, SINR per coded bit (M. Lacage, T. R. Henderson, "Yet another network simulator", WNS2 2006).
+The SINR is that in the 22 MHz channel, 20 MHz with OFDM. Values are logarithms of the success probability of one bit,
+by SINR in dB. Other lengths than the tables' follow as 1 - (1 - PER)^(length / table's length), by the table of short
+frames below 400 bytes. Not modeled: frequency-selective fading, channel estimation, phase noise, pilots and guard
+interval.
 """
 
 import math

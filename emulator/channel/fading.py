@@ -5,10 +5,9 @@
     rician     |sqrt(K / (K + 1)) exp(j 2 pi d(t) / lambda) + h / sqrt(K + 1)|^2     K: direct over scattered power
 
 Correlations and sources: docs/explanation/channel.md. The lower station number comes first, so that both directions
-fade alike; between poses x(t) goes on with the pose's velocity. f_n is the Doppler shift by surroundings that move at
-`radio.scatterer_speed_m_s`; at 0 places alone determine the gain. The sum of N waves is mapped by its own distribution
-(J. C. Kluyver's random walk); the correlation of powers is lower by 1 / N than the law. Not modeled: frequency
-selectivity, change within a frame, directions that depend on the place.
+fade alike; between poses x(t) goes on with the pose's velocity. The sum of N waves is mapped by its own distribution
+(J. C. Kluyver's random walk). Not modeled: frequency selectivity, change within a frame, directions that depend on the
+place.
 """
 
 import math

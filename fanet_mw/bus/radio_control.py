@@ -1,10 +1,8 @@
-"""Faults that can be set while a swarm runs: a degraded link, a jammed area, a partition, a node that is cut off, mute
-or deaf, and a UAV that crashes, loses charge, is told wrong positions, or whose program stops.
+"""Faults that can be set while a swarm runs, on the air (`Degrade`, `Jam`, `Cut`, `Partition`) or at a UAV (`Mishap`).
 
-Each fault has a label. A new fault replaces one with the same label, and `Restore` ends one fault or all. A fault lasts
-for `for_ns` from the instant at which the medium receives it; 0 means until it is restored. The same types are the
-messages on `fanet/<s>/radio/control` and the entries of a scenario's `[[faults]]`; the medium checks each with `wrong`,
-and records it. What befalls a UAV (`Mishap`) the world or its host brings about. Not modeled: faults of the bus.
+A new fault replaces one with the same label, and `Restore` ends one fault or all. A fault lasts for `for_ns` from the
+instant at which the medium receives it; 0 means until it is restored. The same types are the messages on
+`fanet/<s>/radio/control` and the entries of a scenario's `[[faults]]`. Not modeled: faults of the bus.
 """
 
 import math

@@ -1,18 +1,8 @@
 """The sending side of delivery: confirmed messages, which pieces each target lacks, and what to send next.
 
-    sent -> all targets have acknowledged it
-         -> no receipt in time -> the missing pieces are sent again, and the wait is doubled
-         -> its lifetime is over -> expired: the application is told which nodes have not confirmed it
-
-The wait for a receipt follows from earlier round trips (RFC 6298). The caller asks `full` first, and refuses a message
-that does not fit.
-
-A message that is longer than a packet is cut into pieces, each of which fits one packet.
-
-    data = stride bytes | stride bytes | ... | the rest       piece 0, 1, ..., pieces - 1; the receiver joins them again
-                                                              (`receiver.py`)
-
-A MAVLink frame is never cut. A packet has less room for data if it names the targets of its message one by one.
+The wait for a receipt follows from earlier round trips (RFC 6298), and is doubled with each repetition; when its
+lifetime is over, the application is told which nodes have not confirmed the message. A longer message than a packet is
+cut into pieces of `stride` bytes and the rest; a MAVLink frame is never cut. The caller asks `full` first.
 """
 
 import heapq

@@ -1,10 +1,8 @@
 """The swarm clock of a real-time run: swarm instant = (clock - epoch) x scale, with an epoch that one keeper announces.
 
-Processes of the keeper's machine count from its monotonic epoch, so that no step of the system's clock moves them;
-those of another machine read unix time once, when they start, and continue by their own monotonic clock: they are as
-accurate as the two unix clocks agree at the epoch and at that start. When the keeper changes the pace, it announces an
-epoch and a scale that give the same instant; who hears of a slower clock late stands still until that has come so far:
-swarm time never goes back. Announcements are numbered, so that an older one changes nothing.
+Processes of the keeper's machine count from its monotonic epoch; those of another machine read unix time once, when
+they start, so they are as accurate as the two unix clocks agree. A change of pace is another epoch and scale that give
+the same instant; who hears of it late stands still until that has come so far: swarm time never goes back.
 """
 
 import asyncio

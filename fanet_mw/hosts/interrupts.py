@@ -1,9 +1,8 @@
 """How the commands of this project react to SIGINT, SIGTERM and SIGHUP, and how a command exits.
 
-Python handles SIGINT only if it was not ignored at the start, as a shell script has it for `command &`; so each entry
-point calls `install`, after which signals raise KeyboardInterrupt with their number, or cancel the coroutine of
-`hosts.loop.run`. A SIGHUP that was ignored, as by nohup, stays ignored. Some libraries swallow an exception during an
-import, others replace it: `raise_again` and `undisguised` are for these.
+Each entry point calls `install`, because Python leaves a SIGINT ignored that was so at the start, as a shell script has
+it for `command &`. Signals then raise KeyboardInterrupt with their number, or cancel the coroutine of `hosts.loop.run`.
+Some libraries swallow an exception during an import, others replace it: `raise_again` and `undisguised` are for these.
 """
 
 import gc

@@ -3,13 +3,9 @@
     hello n ends                   its sender and all receivers stamp that instant, each by its own clock
     hello n+1 says "hello n ended at swarm time t"     -> a pair (own stamp, t) -> the fit of `clock_fit`
 
-Who is the reference, and what is believed: docs/explanation/time.md. A beacon is news if the reference's `round` has
-advanced beyond the last news or, after a while without, beyond that neighbor's last beacon: a restarted reference
-counts anew. A plausible forged beacon counts as one neighbor's statement; it can be outvoted, but is not recognized.
-
-While a node has no time of its own it accepts the leader's statement at once. Any other needs a second neighbor that
-agrees, or some time in which no more contradict it than agree. Not detected: a liar that is the only neighbor, and
-liars that outnumber the honest neighbors (`clock_fit`).
+Who is the reference, and what is believed: docs/explanation/time.md. A plausible forged beacon counts as one neighbor's
+statement; it can be outvoted, but is not recognized: not a liar that is the only neighbor, nor liars that outnumber the
+honest neighbors.
 """
 
 import math

@@ -1,20 +1,13 @@
 """The packets per second that can reach every node, whatever the protocol: an upper bound by counting at receivers.
 
 F: airtime of a packet's frame; D: DIFS, for which a sender finds its medium idle first (IEEE 802.11-2020, 10.3.4.2). A
-station either sends or receives, and it receives one frame at a time on any channel:
+station either sends or receives, and it receives one frame at a time. L packets a second, m transmissions of each:
 
-    (1)  t(u) (F + D) + (L - l(u)) F <= 1       per second, at every node u that sends t(u) frames, l(u) of them for
-                                                packets of its own, L packets of all nodes together
-    (2)  sum over u in N(v) of t(u) >= L        at every node v whose neighbors N(v) are not all nodes: they bring v
-                                                what it lacks, and one of them takes over each packet of v's own
+    at each node v with d < n - 1 neighbors, which have a share s of the packets:      L ((F + D) + (d - s) F) <= d
+    over all n nodes:                                                                L (m (F + D) + (n - 1) F) <= n
 
-(1) summed over N(v), of which d nodes with a share s of the packets, and (2):      L ((F + D) + (d - s) F) <= d
-(1) summed over all n nodes, m transmissions per packet:                     L (m (F + D) + (n - 1) F) <= n
-
-Every node needs a copy of each packet, so m is at least the smallest number of nodes whose greatest degrees suffice:
-the first transmitter reaches itself and its neighbors, each other one at most all its neighbors but the one from which
-it has the packet. The least of these limits is the bound; whether it can be reached is not known. A frame of k packets
-counts as k frames of 1/k of its time each; with the greatest k that fits, the bound holds for all. Assumed: no coding
+The first transmitter reaches itself and its neighbors, each other one at most all its neighbors but the one from which
+it has the packet: that bounds m. A frame of k packets counts as k frames of 1/k of its time each. Assumed: no coding
 across packets, and sources that are equally busy.
 """
 

@@ -4,11 +4,6 @@
     DIR/runs.parquet         the table for people: a row per run of the sweep, in its order, with settings and figures
 
 The same sweep with the same code gives the same `runs.parquet`, whatever the machine and the order of the runs.
-
-The table has one row per run, with the settings that distinguish the runs and all figures of the summary.
-
-Each number of the summary is a column of floats, with names such as `delay_ms.p95`; lists of numbers are columns of
-lists. The whole summary is in the column `summary` as JSON, and the resolved scenario in `scenario`.
 """
 
 import contextlib

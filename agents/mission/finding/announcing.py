@@ -1,10 +1,7 @@
 """What one UAV floods about survivors: estimates while it responds, and its verdicts until all nodes know them.
 
-seen often enough at close range, place certain  -> confirmed: flooded three times, then in hellos for a while
-later receptions make that place impossible      -> refuted: flooded likewise, and the survivor is searched again
-somebody seen, without a phone that fits         -> a person: flooded likewise
-another UAV does not seem to know of a verdict   -> some of those that know it flood it again
-a UAV that was lost is heard again               -> whoever hears it floods all verdicts that were not flooded lately
+A verdict (confirmed, refuted, or a person without a phone) is flooded three times, then said in hellos for a while, and
+again when another UAV does not seem to know of it. Whoever hears a lost UAV again floods all verdicts of some time.
 """
 
 from typing import Final

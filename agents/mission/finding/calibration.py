@@ -1,17 +1,10 @@
 """By how much all phones are stronger or weaker than assumed, estimated from the phones of confirmed survivors.
 
-    RSSI_ij = P + B + b_j - L0 - 10 n log10(d_ij) + shadowing_ij
-
-    RSSI_ij   power with which a receiver at place i receives phone j [dBm]
-    P, L0, n  assumed transmit power [dBm], path loss at 1 m [dB], path loss exponent
-    B         offset common to all phones, by their kind and by the calibration of the receivers [dB]
-    b_j       further offset of phone j alone, ~ N(0, s_b^2) [dB]
-    d_ij      distance of phone j from place i [m]
+    RSSI_ij = P + B + b_j - L0 - 10 n log10(d_ij) + shadowing_ij        B: of all phones; b_j ~ N(0, s_b^2): of phone j
 
 Of a confirmed phone the powers tell B + b_j, never B more exactly than s_b. Powers below the threshold are not
 reported, so the likelihood is truncated there (Cohen, Annals of Mathematical Statistics 21(4), 1950); it has a floor,
-so that no single phone, under rubble or forged, changes the odds by more than a factor of about 200. B = 0 is assumed
-until a model with a large B is `_EVIDENCE_RATIO` times as likely.
+so that no single phone, under rubble or forged, changes the odds by more than a factor of about 200.
 """
 
 import math

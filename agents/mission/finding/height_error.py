@@ -2,10 +2,8 @@
 
     seen_i = place - error * lean_i + noise_i        lean_i = (place - position_i) / height_i, along the ground
 
-GPS is wrong by metres in height, for minutes and for all UAVs of a swarm alike, so whoever is seen from one side is
-placed too near to it, or too far beyond. Seen from two sides, the two places tell the error: by least squares, over all
-people together who are certainly there (false alarms lean as their places do), from a prior by what is known of the
-receiver. Weights are inverse variances [1 / m2].
+GPS is wrong by metres in height, for minutes. Whoever is seen from two sides tells the error: by least squares over all
+people who are certainly there, from a prior by what is known of the receiver. Weights are inverse variances [1 / m2].
 """
 
 import math

@@ -1,13 +1,9 @@
 """Decides which person carries which phone: cameras and microphones show people, receivers identify phones.
 
-    what one reading shows        is assigned to the people known so far, all at once; who is left over is new
-    all people and all phones     are assigned at once, so that all received powers together are most likely
-    a person's phone is certain   when all other carriers together are far less likely (`carriers.py`)
-    a phone is of one of several  when that has not become certain for long: nobody need look for its owner any more
-
-A person who is certainly there without a phone that fits is reported without one (`unreported`). The cost of a pair is
-twice the difference of log-likelihoods of the phone's powers from the person's and from the best place: chi-square with
-2 degrees of freedom for a true pair.
+All people and all phones are assigned at once, so that all received powers together are most likely. A person's phone
+is certain when all other carriers together are far less likely (`carriers.py`). The cost of a pair is twice the
+difference of log-likelihoods of the phone's powers from the person's and from the best place: chi-square with 2 degrees
+of freedom for a true pair.
 """
 
 import math

@@ -1,8 +1,5 @@
 """What one UAV knows of the survivors: which nodes reported each one, where each one is, and which are confirmed.
 
-    a phone is received -> reports by several nodes -> its owner is seen at close range -> confirmed
-    a survivor is confirmed, and later powers of that phone contradict the place        -> refuted, searched for again
-
 A refutation takes back confirmations of the same place that are not younger than itself, in whatever order they arrive,
 and the best announced estimate unless that is younger. Of two confirmations that nothing refutes, the first to arrive
 stays. Confirmed phones calibrate the others (`calibration.py`).

@@ -1,10 +1,6 @@
 """The return of a UAV whose battery runs low, that hears nobody any more, or whose search is over: it flies home above
-all UAVs that search, and lands straight down. Once its camera sees the marker of its own pad it sinks towards that.
-
-Whoever does not know its place gives it up as well: its flight controller holds it, and lands it after a while.
-
-UAVs whose pads are beside each other land in turns: who comes waits `_HOLD_M` from its pad while another one is over
-the pads and has not begun to sink, or while one with a lower id waits as well.
+all UAVs that search, and lands, at last towards the marker of its own pad. Of UAVs whose pads are beside each other one
+lands at a time. Whoever does not know its place gives it up as well: its flight controller holds it.
 """
 
 from collections.abc import Set as AbstractSet

@@ -1,13 +1,7 @@
 """The obstacles that one UAV knows from its map and its radar, and how it flies around them.
 
-    map            buildings whose roofs are not well below the UAV; no-fly areas, at any height
-    lost UAVs      where neighbors that fell silent may hover
-    radar          echoes that neither the map nor a neighbor explains, kept for a while; what moves is a UAV
-    way            straight, if that is clear; else the next corner of the shortest way over a grid
-    half-planes    the nearer an obstacle is, the slower a UAV may fly towards it
-
-The way leads the UAV on, and the half-planes keep it clear. It flies over roofs that are below it, and around
-everything else.
+The way leads the UAV on, and half-planes keep it clear: the nearer an obstacle is, the slower a UAV may fly towards it.
+It flies over roofs that are below it, and around everything else (docs/explanation/search-flight.md, Obstacles).
 """
 
 import math

@@ -1,22 +1,8 @@
 """Plans the search: one node decides which UAV takes which place of the formation, and floods the plan.
 
-    every node: sends its status at once, and then every STATUS_S
-    planner:    the lowest id that was received recently, of each part of a swarm that has come apart; it plans when
-                all nodes have been received, or after _PATIENCE_NS
-    lost nodes: the others close ranks by themselves (`roll_call.py`), and the plan remains, so that a UAV that only
-                seemed to be lost has its place still
-    newcomers:  a node that has no place gets one that nobody has, or that of a node that was not received for _LOST_NS
-    take-off:   the first plan of UAVs on the ground begins when they have had time to climb
-    leavers:    a node whose status says that its battery is only enough for the way home is replaced at once; once the
-                others cannot span the area any more, they get a plan of their own, and begin anew
-    alone:      a node that has received nobody takes the place with its own number, and keeps it; others that are
-                alone then search other lanes
-    restarts:   a node without a plan that hears of others' waits to be told it, even if it has the lowest id; of those
-                that follow the newest plan, the one with the lowest id stands in as the planner until then
-
-The first assignment nearly minimizes the sum of squared distances, and keeps the swarm in one piece on the way where it
-can (`lasting_links.py`). UAVs that are out for survivors become followers, on whom nothing depends, where ways allow.
-`shapes/contract.py` explains place, team, relay and follower.
+The planner is the lowest id that was received recently, of each part of a swarm that has come apart. Lost UAVs keep
+their places: the others close ranks by themselves (`roll_call.py`). Who flies home is replaced at once, and once the
+others cannot span the area, they get a plan of their own (docs/explanation/search.md, Who decides what).
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence

@@ -1,13 +1,10 @@
 """Who flies to which place of a formation, so that the swarm is one network all the way.
 
-    All leave at one instant and arrive at one instant, each flies straight at constant speed. So the distance of two
-    UAVs is a convex function of time, and a link between them lasts if it exists at both ends of the way. The
-    assignment with the least sum of squared distances keeps many links; then pairs exchange their places, at first
-    also if that is for the worse (simulated annealing; Kirkpatrick, Gelatt and Vecchi, Science 220, 1983), until links
-    that last join all UAVs, and then only to shorten ways. If no try joins them, the first assignment remains.
-
-A node can do nothing else meanwhile, so of each pair that is drawn one may always fly to the other's goal, and links
-are bit masks, one for each UAV: 45 are mostly joined within 40 ms (`tests/benchmarks/keeping_together.py`).
+All leave and arrive at one instant and fly straight, so a link lasts if it exists at both ends of the way. From the
+assignment with the least sum of squared distances, pairs exchange places, at first also if that is for the worse
+(simulated annealing; Kirkpatrick, Gelatt and Vecchi, Science 220, 1983), until links that last join all UAVs. Links are
+bit masks, because a node can do nothing else meanwhile: 45 are mostly joined within 40 ms
+(`tests/benchmarks/keeping_together.py`).
 """
 
 import math

@@ -1,17 +1,8 @@
 """Which UAVs of the plan are lost, by what this UAV hears and what its neighbors say in their hellos.
 
-    heard     the latest instant at which anybody is known to have heard a UAV; each hello tells them all on
-    lost      said by a UAV that has heard it itself until lately, when nobody is known to have heard it for some time;
-              it is told on with the instant at which the UAV was last heard, and a later one takes it back
-    falls     a UAV that falls says so at once, and is lost
-    silent    a neighbor whose radio sends nothing for unusually long is lost as well, before a hello is overdue; not if
-              others have heard it since, because then it is out of reach
-    away      a UAV that this one has not heard itself for long, or that may be out of its reach, is lost only after
-              much longer, because news take a second a hop: then it is cut off with a part of the swarm
-    missed    a UAV beyond a lost one that does not come into reach although it should hurry here is lost, too
-    mute      a UAV that hears for some seconds that it is lost itself, and never that it is not, is not heard
-
-Whoever finds by its own receiver that a UAV is lost, or back, floods its roll soon, unless another has told the same.
+A UAV in reach is lost once nobody is known to have heard it for some time, at once if it falls or its radio is silent
+for unusually long; one that may be out of reach only after much longer, because news take a second a hop. Whoever finds
+by its own receiver that a UAV is lost, or back, floods its roll soon (docs/explanation/search.md, Whoever is lost).
 """
 
 from collections.abc import Collection

@@ -1,11 +1,6 @@
-"""Decides for which survivors one UAV bids, and to which of those that it has won it flies.
-
-the survivor is heard                    an auction for one responder, the nearest UAV that may leave
-enough UAVs have reported the survivor   an auction for as many responders as the scenario wants
-too few have, after a while              an auction for one more UAV that has not, to get another bearing
-before the sweep                         any UAV may respond that is at its place nearly in time, to a vague place more
-a responder does not find the survivor   it withdraws its bid after a while
-a responder does not come to the place   it withdraws its bid, a while after it should have been there
+"""Decides for which survivors one UAV bids, and to which of those that it has won it flies: at first one responder, for
+another bearing a second one, and once enough UAVs have reported the survivor as many as the scenario wants. Who does
+not get there, or does not find the survivor, withdraws its bid after a while.
 """
 
 import math

@@ -1,13 +1,7 @@
 """The clustered protocol at one node: it hands each event to the parts of the protocol, and decides nothing itself.
 
-    event                              parts that handle it
-    packet of an own application       one_way, if that takes it; it is flooded from here if no way is known;
-                                       access otherwise: it floods it from here, or sends it towards a head
-    packet on its way                  the same
-    flooded packet                     roles, if it is a control packet; relaying decides whether and when to pass it on
-    hello                              neighbors, roles, gradient, repair; then access, which may have a route now
-
-To a head a packet goes as acknowledged unicast (TO_HEAD), then to all nodes as a flood (FLOOD), as its flags say.
+To a head a packet goes as acknowledged unicast (TO_HEAD), then to all nodes as a flood (FLOOD), as its flags say; to
+one receiver by `one_way`, if that takes it, and as a flood from here if no way is known.
 """
 
 from collections.abc import Mapping, Sequence

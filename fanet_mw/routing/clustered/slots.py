@@ -1,15 +1,8 @@
-"""Access by the slots of heads: members send packets to their cluster head, which floods them in its own slot.
+"""Access by the slots of heads: members send packets to their cluster head, which floods them in its own slot (the
+protocol of section 3.3 of the paper). All other frames contend for the channel at any time.
 
-This is the protocol of section 3.3 of the paper that fanet-mw follows ("Reliable Flying IoT Networks for UAV Disaster
-Rescue Operations"). All other frames contend for the channel at any time: hellos, control packets, relays, and unicasts
-on the way to a head.
-
-Packets in the transmit queue of a head are released only in its own slot, each announced one lead ahead.
-
-By `clusters.pacing = "burst"` they follow each other with the least gap (`clusters.release_gap_ms`), by `"spread"` the
-slot is divided evenly among those that wait when it begins, up to 40 ms apart, so that one flood has moved on before
-the next. What does not fit waits for the next occurrence of the slot. A head that loses its role uses its old slot for
-the rest: sending them to the new head would cost more.
+What does not fit a slot waits for the next one. A head that loses its role uses its old slot for the rest: sending them
+to the new head would cost more.
 """
 
 from collections.abc import Mapping

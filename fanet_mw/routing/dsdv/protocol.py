@@ -1,19 +1,9 @@
 """DSDV at one node (Perkins and Bhagwat, SIGCOMM 1994): each node advertises its distances, with sequence numbers.
 
-    every 15 s  -> full dump, own number + 2
-    changes     -> an incremental update within a second: new destinations and broken routes at once, another metric
-                   when it has settled
-    link breaks -> infinite metric, odd number; a link has broken when a unicast is not acknowledged, or when at a full
-                   dump no update has renewed the route for three periods
-
-As in ns-3 a packet without a route waits at its origin, an infinite metric counts only from the next hop, and the
-periods are the same. Broadcast data is flooded. Not modeled: the base-station extension and layer-2 addresses
-(section 4).
-
-In its table (sections 3.1 to 3.4) a newer sequence number prevails over a shorter route; of equally new routes the
-shorter prevails. Forwarding uses the best route at once. Advertising waits: a new destination or a broken route is
-advertised at once, another metric when it has settled, that is after twice the weighted average of how long better
-routes with the same number kept coming.
+A newer number prevails over a shorter route. A new destination or a broken route is advertised at once, another metric
+when it has settled: after twice the weighted average of how long better routes with the same number kept coming. As in
+ns-3 a packet without a route waits at its origin, an infinite metric counts only from the next hop, and the periods are
+the same. Broadcast data is flooded. Not modeled: the base-station extension and layer-2 addresses (section 4).
 """
 
 from collections.abc import Mapping

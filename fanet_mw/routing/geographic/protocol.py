@@ -1,15 +1,9 @@
 """Carry and forward by position, in the manner of VADD (Zhao and Cao, IEEE INFOCOM 2006), without its roads.
 
-    a neighbor nearer to the destination  -> hand the packet over (acknowledged), to the nearest such neighbor
-    none                                  -> keep it while flying on; look again twice a second
-    handed over                           -> custody has passed on: the same packet may come back later
-
-Location service: a destination that receives data floods its position, at most every 5 s, or once a second when
-queried; beacons (1 s, one hop) carry the locations in use between partitions. A stale location is used until a newer
-one comes. Broadcast data is flooded.
-
-Not modeled: VADD's delay estimates per road segment, intersections and its L-, D- and H- variants; the motion of
-neighbors between beacons; recovery round voids other than by carrying (perimeter routing).
+A packet is handed over, acknowledged, to the neighbor nearest to the destination, or kept while flying on. A
+destination that receives data floods its position, at most every 5 s, or once a second when queried; beacons carry the
+locations in use between partitions. Not modeled: VADD's delay estimates per road segment and its variants; the motion
+of neighbors between beacons; recovery round voids other than by carrying.
 """
 
 from collections.abc import Mapping

@@ -1,13 +1,10 @@
 """Fits the pace of the swarm's clock to what the machine can do, by the reports of one second each.
 
-    late in most moments of a second, not catching up   an overload: the pace falls to three quarters
-    more late in 20 s than a limit allows in 20 s       the same
-    late in a few moments                               a pause of the machine: the limits of the run judge it
-    nothing late                                        the pace rises again, by CUBIC's curve (RFC 9438, 4.2)
-
-The limits are those within which a whole run is valid (`sim.results.validity`). Where the swarm itself takes all the
-processor time there is, the pace stays below that of the overload. In its last second a run is left alone: a process
-that hears late of another pace would not end with the others.
+Late in most moments of a second, or more in 20 s than a limit allows, is an overload: the pace falls to three quarters,
+and rises again by CUBIC's curve (RFC 9438, 4.2). The limits are those within which a whole run is valid
+(`sim.results.validity`). Where the swarm itself takes all the processor time there is, the pace stays below that of the
+overload. In its last second a run is left alone: a process that hears late of another pace would not end with the
+others.
 """
 
 import math

@@ -6,16 +6,8 @@
     relay      a place that only keeps two teams within radio reach of each other
     follower   a place behind a team that nothing depends on, so that its UAV may leave it
 
-    lines      two lines abreast part from the middle of the area, or more in step; chains of relays join them
-    spiral     arms turn about the middle, or one arm winds outward from it; any number of UAVs will do
-    sectors    one team sweeps each sector; more UAVs are free for survivors, but the swarm does not stay connected
-    circuit    one team on a closed way over the whole area; any number of UAVs is used, and nobody need hear anybody
-    ring       one team on a square that grows from the middle to the edge; no single loss separates anybody
-    fan        one team on a front that spreads from a base beside the area over all of it
-
-In all of them places of teams come first (team 0 lane by lane, team 1, ...), then relays, then followers. No place
-jumps. The sweep is the flight out to the edge of the area; it ends with a turn, and is repeated after the way back.
-Everything here is geometry, in metres and seconds.
+Places of teams come first (team 0 lane by lane, team 1, ...), then relays, then followers. No place jumps. The sweep is
+the flight out to the edge of the area; it ends with a turn, and is repeated after the way back.
 """
 
 import math

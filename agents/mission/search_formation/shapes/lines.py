@@ -1,28 +1,14 @@
-"""The formation `lines`: two lines of UAVs that part from the middle of the area, a chain between them, and followers.
+"""The formation `lines`: lines of UAVs that part from the middle of the area, with chains between them, and followers.
 
             line 0   o--o--o--o--o--o--o        both lines, nearly as wide as the area, begin near its middle and
-                              |                 sweep away from each other to its edges, then back, and again
-            followers   x  x  |  x  x           followers fly behind their line and are free to leave it
+                              |                 sweep away from each other to its edges, then back between the lanes of
+            followers   x  x  |  x  x           the way out; followers fly behind their line and are free to leave it
                               |  chain          the relays of the chain spread as the lines part
             line 1   o--o--o--o--o--o--o
 
-With UAVs enough there are more lines, as many to the north as to the south: each sweeps its share of its half and ends
-where the next one began, and chains join neighboring ones unless these are within reach of each other anyway.
-
-The teams are the lines, from the northernmost to the southernmost (`contract.py`).
-
-Lines of a swarm that stands spread over the middle of the area begin a little beyond it, little wider than it, bent
-back at both ends:
-
-             .-o--o--o--o--o-.        what is between them was heard by those who stood there; beside that the
-       <--  o                 o  -->  outermost lanes first fly to the sides, and then catch up, while the middle
-                 (heard)              sweeps at once, and waits at the edge of the area; on the way back all fly to
-       <--  o                 o  -->  the middle
-             '-o--o--o--o--o-'
-
-The chain between them is folded to an S, so that its relays have a short way to their places.
-
-On its way back each UAV flies between the lanes of its way out.
+With UAVs enough there are more lines, each with a share of its half. Lines of a swarm that stands spread over the
+middle of the area begin a little beyond it, little wider than it, bent back at both ends, with the chain folded to an
+S: what is between them was heard by those who stood there, and the outermost lanes first fly to the sides.
 
 Between two turns a place of other lines moves straight at constant speed, a relay but for one change when the lines
 have flown `_STRAIGHT_M`. Distances are convex in between, so a pair within radio reach at these three instants is so

@@ -1,14 +1,8 @@
 """The formation `ring`: all UAVs on a square about the middle of the area that grows to its edges, and back, and again.
 
-    o---o---o---o---o     neighbors along the square stay within radio reach, so any two UAVs are connected by two ways:
-    |               |     the loss of any one of them separates nobody
-    o               o
-    |               |     while the square is small, every second UAV far from a corner may leave it for a survivor, as
-    o               o     those beside it reach each other; one near a corner would not catch up with it
-    |               |
-    o---o---o---o---o     every side has the same number of UAVs; up to three that are left over fly behind the ring
-
-A ring is one team without relays (`contract.py`).
+Neighbors along the square stay within radio reach, so the loss of any one separates nobody. While it is small, every
+second UAV far from a corner may leave it for a survivor; one near a corner would not catch up with it. Every side has
+the same number of UAVs, and up to three that are left over fly behind the ring.
 """
 
 import math

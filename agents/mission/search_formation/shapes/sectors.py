@@ -1,15 +1,8 @@
-"""The formation `sectors`: the area is divided into equal sectors, and each is swept by a team of UAVs abreast.
+"""The formation `sectors`: the area is divided into equal sectors in rows, and each is swept by a team of UAVs abreast.
 
-    +-------+-------+     sectors lie in rows; a team is as wide as its sector, and sweeps it to the north or to the
-    | o-o-o | o-o-o |     south, and back
-    |  ^    |  ^    |
-    +-------+-------+     the teams of a row move in step, side by side, and stay within radio reach of each other
-    |  v    |  v    |
-    | o-o-o | o-o-o |     there are no relays between the rows, so more UAVs than in other formations are followers,
-    +-------+-------+     which are free to fly to survivors
-
-Rows in the south of the area are swept southward, others northward, as is a middle or an only one: two rows begin
-beside each other, part, and meet on the way back. `contract.py` explains the words.
+The teams of a row move in step, side by side. There are no relays between rows, so more UAVs are followers than in
+other formations. Rows in the south of the area are swept southward, others northward, as is a middle or an only one:
+two rows begin beside each other, part, and meet on the way back.
 """
 
 import math

@@ -1,16 +1,12 @@
 """Measures the quality of a node's links from the hellos of its neighbors: the share of hellos received, and their mean
 RSSI.
 
-    estimated share = (received + 1/2) / (due + 1), for the hellos of the latest 24 intervals
+    estimated share = (received + 1/2) / (due + 1), for the hellos of the latest 24 intervals    (Krichevsky, Trofimov)
 
-This is the estimate of Krichevsky and Trofimov, by which a link of which little is known is neither good nor bad. A
-node sends its estimates to the leader in a join: first when enough hellos should have arrived, later when a link has
-changed. Not modeled: a hello may also be lost by a collision; it then counts as a loss of the link.
-
-The leader knows all links (`LinkState`), put together from what each node has reported about the links to it. Both
-directions are taken to be equally good, so the mean of both measurements counts, or the only one there is. If one end
-receives nothing, there is no link, but the sender may still disturb: the entry keeps its power, and gets a grade of 0.
-The share of a usable link is drawn towards the mean of all usable links (shrinkage), as it is known from few hellos.
+The leader knows all links (`LinkState`) from what nodes report. Both directions are taken to be equally good; if one
+end receives nothing, there is no link, but the sender may still disturb: the entry keeps its power, and gets a grade of
+0. Shares are drawn towards the mean of all usable links (shrinkage). Not modeled: hellos lost by collisions count
+alike.
 """
 
 from collections import deque

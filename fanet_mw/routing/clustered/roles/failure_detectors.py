@@ -1,18 +1,8 @@
 """Signs of life, and what their absence says of a cluster head, of a neighbor, and of this node itself.
 
-    head        four hello intervals in which no packet that it generated has arrived, and no newer sequence number of
-                it in hellos; two once the MAC has failed to reach it
-    neighbor    with a timetable, where a failed relay cuts off all nodes behind it: no hello for four intervals and no
-                packet that it generated, or a hello that says that it hears nobody
-                    -> this node floods a join that reports it, unless another node has done so
-                    -> it objects and stays, or the leader makes a new timetable without it
-    everybody   no frame for four intervals: all that this node sends is flagged (`FLAG_DEAF`), until it hears a frame
-
-Each further member of the succession waits half an interval longer for the one before it to stand in. Members without
-news of the head do not judge it, because they may never have been near it. A neighbor that has flown away objects, too,
-and is not reported again until a hello of it is heard; without an objection it is reported again every 10 s for a
-minute, while no packets of it arrive; a node floods at most one report in 5 s. What a deaf node sends is no sign of
-life and no objection, or one that goes on sending would be planned with for ever: only applications use it.
+Four hello intervals without one are silence; each further member of the succession waits half an interval longer for
+the one before it to stand in. Members without news of the head do not judge it. What a deaf node sends is no sign of
+life and no objection, or one that goes on sending would be planned with for ever (docs/explanation/roles.md).
 """
 
 from collections.abc import Callable

@@ -1,11 +1,6 @@
-"""Decides when a node joins: it floods a packet that states where it is, and asks the leader for a place.
-
-    the node has no place in a cluster    at a random instant, and again until a schedule names the node
-    it is not where the leader believes   soon after the next hello, spread over the nodes (`position_updates.py`)
-    its links are measured                likewise, as soon as there is an estimate, and when a link has changed; again
-                                          until the leader announces links, because any flood may be lost
-
-A node also floods a join when it reports another node as silent, or objects to such a report (`failover.py`).
+"""Decides when a node joins: it floods a packet that states where it is, and asks the leader for a place. It does so
+until a schedule names it, and again when it is not where the leader believes (`position_updates.py`), or when a
+measured link has changed; also to report a silent node, or to object to such a report (`failover.py`).
 """
 
 from collections.abc import Callable

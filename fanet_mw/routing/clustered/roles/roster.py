@@ -1,17 +1,9 @@
 """The nodes that the leader knows: their motions, from joins, and which of them are reported silent.
 
-    position of a node   where it was, flown on straight with the velocity that it stated
-    of a companion       the same, moved by as much as the leader has strayed from straight flight since: a node whose
-                         velocity was the leader's. So a formation that turns keeps its shape before its updates have
-                         come. One that has sent none although the leader has turned long ago has not turned along
-    in a rigid formation  where it was beside the leader, whatever velocities are stated: they have errors, and are 0
-                          until GPS has first told them
-
-    a node joins              -> it is known until it has given no sign of life for `lost_ns`, in which it should have
-                                 sent two position updates
-    it is reported silent     -> it may object for `objection_ns` -> it is forgotten unless it has objected
-
-Any packet that the node has generated after the report counts as its objection.
+A node is where it was, flown on straight; a companion, whose velocity was the leader's, also moves as the leader has
+strayed from straight flight since, so that a formation that turns keeps its shape; in a rigid formation it is where it
+was beside the leader. A silent node is forgotten unless it objects within `objection_ns`: any packet that it has
+generated after the report counts as its objection.
 """
 
 import math

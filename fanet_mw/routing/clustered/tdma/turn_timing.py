@@ -1,13 +1,9 @@
 """The geometry of a superframe with collision-free floods: a contention window, then turns of equal length. Pure
 functions of time.
 
-    origin                                            origin + period
-    | contention window | turn 0 | turn 1 | ... | rest | contention window | ...
-
 A turn has room for one frame of the largest size, the DIFS before it, the longest backoff that an earlier frame may
-have left behind, and a slack for the error of the clocks. Frames without a turn contend in the window. The *root* of a
-flood is the node at which it begins; the *span* of its floods is the number of turns from that turn until all nodes
-have the packet, the first and the last one included.
+have left behind, and a slack for the error of the clocks. The *root* of a flood is the node at which it begins; the
+*span* is the number of turns from that turn until all nodes have the packet, the first and the last one included.
 """
 
 from collections.abc import Callable, Mapping, Sequence

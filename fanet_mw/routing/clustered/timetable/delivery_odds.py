@@ -1,13 +1,9 @@
 """Simulates the floods of a timetable over lossy links: which share of nodes has a packet afterwards, and after
 repairs.
 
-    flood    for each frame of the table and each of its receivers, it is drawn whether the frame arrives
-    repair   a node that lacks the packet says so in its hello, and a neighbor answers in a turn of its own
-
-A frame disturbed by another in the same turn is lost, others independently by measured shares. `_TRIALS` floods of each
-root are simulated side by side, one in each bit of an integer, with one named random stream, alike at all nodes. In a
-round of repair only the best neighbor counts. Not modeled: that several nodes ask at once, so that an answer waits
-longer than until the next turn but one.
+`_TRIALS` floods of each root are simulated side by side, one in each bit of an integer, with one named random stream,
+alike at all nodes. In a round of repair only the best neighbor counts. Not modeled: that several nodes ask at once, so
+that an answer waits longer than until the next turn but one.
 """
 
 from collections.abc import Mapping, Sequence

@@ -6,10 +6,7 @@ arrived.
     holder            the root, and each node with enough: it may relay the packet, several times if others need it
     call              a frame of a node to its neighbors only, in a turn of its own: a hello, or the answer to one
 
-Turns are filled as in `list_scheduling.py`, but a receiver that another sender in the turn disturbs
-(`InterferenceByPower`) is served later, if half of the worth of the frame remains. In flight, `turn_access.py` repeats
-own packets, and `scheduled_relaying.py` relays. Not modeled: that a relay may lack the packet although it has had
-enough copies (`sim/planner/flood_loss.py` includes that).
+Not modeled: that a relay may lack the packet although it has had enough copies (`sim/planner/flood_loss.py`).
 """
 
 import math

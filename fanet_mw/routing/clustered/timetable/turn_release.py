@@ -1,15 +1,10 @@
 """The transmit queues of a node that has turns: one frame in each turn, announced to the radio one lead ahead.
 
-`RootRelease` sends in the turns in which the node is the root of a flood (`tdma/turn_timing.py` explains root, turn and
-span):
-
     a turn:  | one warning | one report | bulk, in order, as many as fit              | the rest, most urgent first |
                                         | or, in its place, a leader's announcements |
 
-Each class in use (`reserved_room.reserved`) has room of its own in a turn; a packet larger than that waits like bulk. A
-turn is used only if its flood is over before the next timetable. `CallRelease` sends what only neighbors need: missed
-packets and hellos in *calls* (`redundant_scheduling.py`), packets to one neighbor in *spare turns*
-(`list_scheduling.py`).
+Each class in use has room of its own in a turn (`turn_size.reserved`); a packet larger than that waits like bulk. A
+turn is used only if its flood is over before the next timetable.
 """
 
 from abc import ABC, abstractmethod

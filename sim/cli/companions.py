@@ -1,4 +1,4 @@
-"""Programs beside a swarm that is launched: `fanet record` and `fanet view`, each a process that only listens.
+"""Programs beside a swarm that is launched: `fanet record`, `view`, `gateway` and `autopilots`, each a process.
 
 They are processes of their own, so that the launcher, whose router all frames pass, has nothing to do with them.
 """
@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Self
 
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from fanet_mw.scenario import Scenario
 
 _NICENESS: Final = 5
+_ONLY_LISTEN: Final = ("record", "view")
+"""These give way; a gateway and a world of flight controllers are waited for, as the emulator is."""
 _CLOSING_S: Final = 20.0
 _TERMINATED: Final = (-signal.SIGTERM, 128 + signal.SIGTERM)
 
@@ -60,8 +63,8 @@ class Companions:
             self._unready[len(self._running)] = hears
             self._running.append(
                 subprocess.Popen(  # noqa: S603  (a command of fanet-mw)
-                    command, env={**found, VARIABLE: str(tells)}, pass_fds=(tells,), start_new_session=True,
-                    stdin=subprocess.DEVNULL, preexec_fn=_give_way,
+                    command, env={**found, VARIABLE: str(tells)}, pass_fds=(tells,), process_group=0,
+                    stdin=subprocess.DEVNULL, preexec_fn=partial(_begin, gives_way=words[0] in _ONLY_LISTEN),
                 )
             )  # fmt: skip
             os.close(tells)
@@ -108,8 +111,13 @@ class Companions:
         return path
 
 
-def _give_way() -> None:
-    os.nice(_NICENESS)
+def _begin(*, gives_way: bool) -> None:
+    """In a group of its own, which Ctrl-C does not reach, but in the launcher's session: Linux shares processors among
+    sessions first, so that one of its own would take as much as a swarm, or starve beside busy ones, whatever its nice.
+    """
+    if gives_way:
+        os.nice(_NICENESS)
+    signal.signal(signal.SIGTTOU, signal.SIG_IGN)  # `stty tostop` would stop what it says
 
 
 def record_command(path: Path) -> list[str]:

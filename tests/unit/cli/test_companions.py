@@ -30,6 +30,9 @@ def test_one_that_fails_before_it_listens_keeps_the_swarm_on_the_ground() -> Non
     with Companions([["record", "x.mcap", "--nonsense"]]) as companions:
         companions.start(SwarmAddress("tcp/127.0.0.1:1", "s"), catalog.find("quick"))
         assert companions.awaited() == ["fanet record"]
+        pid = companions._running[0].pid
+        assert os.getsid(pid) == os.getsid(0), "it shares the processors with its swarm"
+        assert os.getpgid(pid) == pid, "Ctrl-C does not reach it"
         companions._running[0].wait(60)
         with pytest.raises(HostError, match=r"fanet record x\.mcap --nonsense: ended with code 2, so nobody takes off"):
             companions.awaited()

@@ -1,75 +1,54 @@
 """Small meshes and outlines of what is shown."""
 
 import math
-from typing import Final
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from trimesh import creation, util
 
 Rows = npt.NDArray[np.float32]
 Faces = npt.NDArray[np.int32]
-_BOX: Final = np.array([(x, y, z) for z in (-0.5, 0.5) for y in (-0.5, 0.5) for x in (-0.5, 0.5)], np.float32)
-_BOX_FACES: Final = np.array(
-    [
-        (0, 2, 3), (0, 3, 1), (4, 5, 7), (4, 7, 6), (0, 1, 5), (0, 5, 4),
-        (2, 6, 7), (2, 7, 3), (0, 4, 6), (0, 6, 2), (1, 3, 7), (1, 7, 5),
-    ],
-    np.int32,
-)  # fmt: skip
 
 
 def box() -> tuple[Rows, Faces]:
-    return _BOX, _BOX_FACES
+    return _arrays(creation.box())
 
 
 def quadrotor() -> tuple[Rows, Faces]:
     """A multirotor of span 1 that faces +x: two arms, four rotors and a nose."""
-    parts = [_moved(1.0, 0.08, 0.08, turn=math.pi / 4), _moved(1.0, 0.08, 0.08, turn=-math.pi / 4)]
-    parts.append(_moved(0.34, 0.2, 0.14, at=(0.1, 0.0, 0.03)))
-    vertices = [corners for corners, _ in parts]
-    faces = [triangles for _, triangles in parts]
-    for quarter in range(4):
-        angle = math.pi / 4 + quarter * math.pi / 2
-        rim, disk = _disk(0.22, 0.5 * math.cos(angle), 0.5 * math.sin(angle), 0.09)
-        vertices.append(rim)
-        faces.append(disk)
-    return _joined(vertices, faces)
+    angles = [math.pi / 4 + quarter * math.pi / 2 for quarter in range(4)]
+    parts = [creation.box((1.0, 0.08, 0.08), _at(turn=angle)) for angle in angles[:2]]
+    parts.append(creation.box((0.34, 0.2, 0.14), _at(0.1, 0.0, 0.03)))
+    for angle in angles:
+        rotor = _at(0.5 * math.cos(angle), 0.5 * math.sin(angle), 0.09)
+        parts.append(creation.cylinder(0.22, height=0.02, sections=10, transform=rotor))
+    return _arrays(util.concatenate(parts))
 
 
-def ring(radius: float, width: float, *, corners: int = 24) -> tuple[Rows, Faces]:
-    """A flat ring about the origin, seen from both sides."""
-    angles = np.arange(corners) * 2 * math.pi / corners
-    around = np.stack([np.cos(angles), np.sin(angles), np.zeros(corners)], axis=1)
-    vertices = np.concatenate([around * (radius - width / 2), around * (radius + width / 2)]).astype(np.float32)
-    here = np.arange(corners)
-    after = (here + 1) % corners
-    up = np.concatenate(
-        [
-            np.stack([here, here + corners, after + corners], axis=1),
-            np.stack([here, after + corners, after], axis=1),
-        ]
-    )
-    return vertices, np.concatenate([up, up[:, ::-1]]).astype(np.int32)
+def ring(radius: float, width: float) -> tuple[Rows, Faces]:
+    """A flat ring about the origin."""
+    return _arrays(creation.annulus(radius - width / 2, radius + width / 2, height=0.1 * width, sections=24))
 
 
-def ball(*, rings: int = 8, sectors: int = 12) -> tuple[Rows, Faces]:
+def ball() -> tuple[Rows, Faces]:
     """A sphere of diameter 1."""
-    up, around = np.meshgrid(np.linspace(0, math.pi, rings + 1), np.linspace(0, 2 * math.pi, sectors + 1))
-    vertices = np.stack([np.sin(up) * np.cos(around), np.sin(up) * np.sin(around), np.cos(up)], axis=2) / 2
-    at = (np.arange(sectors)[:, None] * (rings + 1) + np.arange(rings)[None]).ravel()
-    faces = np.concatenate(
-        [
-            np.stack([at, at + 1, at + rings + 2], axis=1),
-            np.stack([at, at + rings + 2, at + rings + 1], axis=1),
-        ]
-    )
-    return vertices.reshape(-1, 3).astype(np.float32), faces.astype(np.int32)
+    return _arrays(creation.uv_sphere(0.5, count=(8, 12)))
 
 
-def circle_segments(east: float, north: float, up: float, radius: float, *, corners: int = 32) -> Rows:
-    """The outline of a level circle as line segments [corners, 2, 3]."""
-    angles = np.arange(corners + 1) * 2 * math.pi / corners
-    heights = np.full(corners + 1, up)
+def _at(x: float = 0.0, y: float = 0.0, z: float = 0.0, *, turn: float = 0.0) -> npt.NDArray[np.float64]:
+    cos, sin = math.cos(turn), math.sin(turn)
+    return np.array([(cos, -sin, 0, x), (sin, cos, 0, y), (0, 0, 1, z), (0, 0, 0, 1)])
+
+
+def _arrays(mesh: Any) -> tuple[Rows, Faces]:  # noqa: ANN401  (trimesh's classes)
+    return mesh.vertices.astype(np.float32), mesh.faces.astype(np.int32)
+
+
+def circle_segments(east: float, north: float, up: float, radius: float) -> Rows:
+    """The outline of a level circle as line segments [n, 2, 3]."""
+    angles = np.linspace(0.0, 2 * math.pi, 33)
+    heights = np.full(len(angles), up)
     around = np.stack([east + radius * np.cos(angles), north + radius * np.sin(angles), heights], axis=1)
     return np.stack([around[:-1], around[1:]], axis=1).astype(np.float32)
 
@@ -81,30 +60,3 @@ def rgb(web: str) -> tuple[int, int, int]:
 def linear(paints: object) -> npt.NDArray[np.uint8]:
     """Colors as light, sRGB's curve undone, which viser takes in batches and at ends of lines."""
     return np.rint(255 * (np.asarray(paints, float) / 255) ** 2.2).astype(np.uint8)
-
-
-def _moved(
-    length: float, width: float, height: float, *, turn: float = 0.0, at: tuple[float, float, float] = (0, 0, 0)
-) -> tuple[Rows, Faces]:
-    corners = _BOX * np.array([length, width, height], np.float32)
-    cos, sin = math.cos(turn), math.sin(turn)
-    turned = corners @ np.array([(cos, sin, 0), (-sin, cos, 0), (0, 0, 1)], np.float32)
-    return (turned + np.array(at, np.float32)).astype(np.float32), _BOX_FACES
-
-
-def _disk(radius: float, x: float, y: float, z: float, *, corners: int = 10) -> tuple[Rows, Faces]:
-    angles = np.arange(corners) * 2 * math.pi / corners
-    rim = np.stack([x + radius * np.cos(angles), y + radius * np.sin(angles), np.full(corners, z)], axis=1)
-    vertices = np.concatenate([[[x, y, z]], rim]).astype(np.float32)
-    here = np.arange(corners) + 1
-    after = here % corners + 1
-    up = np.stack([np.zeros(corners), here, after], axis=1)
-    return vertices, np.concatenate([up, up[:, ::-1]]).astype(np.int32)
-
-
-def _joined(vertices: list[Rows], faces: list[Faces]) -> tuple[Rows, Faces]:
-    starts = np.cumsum([0, *(len(part) for part in vertices[:-1])])
-    return (
-        np.concatenate(vertices).astype(np.float32),
-        np.concatenate([part + start for part, start in zip(faces, starts, strict=True)]).astype(np.int32),
-    )

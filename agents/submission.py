@@ -31,7 +31,6 @@ class Submission(NamedTuple):
     """The number of the port; `MAVLINK_PORT` if `data` are MAVLink frames."""
     data: bytes
     to: NodeId
-    """The destination of the packets."""
     targets: tuple[NodeId, ...]
     """The nodes that are addressed one by one; empty for a message to one node or to all."""
     priority: int

@@ -26,7 +26,6 @@ _EXTRAS: Final = {
     "viser": "view",
     "textual": "inspect",
 }
-"""The extra with which each module is installed."""
 _REMEDY: Final = (
     "install fanet-mw into an environment of its own: python3 -m venv fanet && fanet/bin/pip install 'fanet-mw[all]'"
 )

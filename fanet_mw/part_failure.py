@@ -18,7 +18,6 @@ from fanet_mw.errors import FanetError, HostError
 from fanet_mw.units import S
 
 OURS: Final = ("fanet_mw", "agents", "emulator", "sim")
-"""The packages of this project."""
 _DEEPEST: Final = 10
 """The depth of a report, which may be read wherever it is told; one that holds itself has none."""
 _TOLD: Final[Mapping[str, tuple[type, ...]]] = {

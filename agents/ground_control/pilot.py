@@ -67,7 +67,6 @@ class Pilot:
         self._say = say
         self._course: Course | None = None
         self._fly: Course | None = None
-        """A course to command now."""
         self._setpoint_ns: int | None = None
         self._ground_m = home.up
         self.beyond = False

@@ -47,7 +47,6 @@ _MISSING: Final = (_UNKNOWN_U16, -1)
 _STREAM: Final = common.MAV_CMD_SET_MESSAGE_INTERVAL
 _MODE: Final = common.MAV_CMD_DO_SET_MODE
 _TAKES_OFF: Final = (_MODE, common.MAV_CMD_COMPONENT_ARM_DISARM, common.MAV_CMD_NAV_TAKEOFF)
-"""The commands of a take-off."""
 
 
 class _Waiting(NamedTuple):

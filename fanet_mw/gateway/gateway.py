@@ -80,7 +80,6 @@ class SwarmFacts(NamedTuple):
     nodes: list[NodeId]
     until_ns: int
     post: NodeId | None
-    """The post on the ground, if there is one."""
 
 
 def facts_of(bus: Bus, names: Topics) -> SwarmFacts:

@@ -42,7 +42,6 @@ class AsciiGrid(NamedTuple):
     void: float | None
     """The value of cells without a height, if the header declares one."""
     lines: Sequence[str]
-    """The lines below the header."""
     first_line: int
     """The number of the first of them in the file."""
 

@@ -24,7 +24,6 @@ class Running(NamedTuple):
 
     swarm: str
     endpoint: str
-    """The endpoint of its Zenoh router."""
     pid: int
     """The process id of its launcher or router."""
     started: str

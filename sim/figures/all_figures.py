@@ -22,7 +22,6 @@ FIGURES: Final[Mapping[str, Recipe]] = {
     "mission": rescue.MISSION,
     "realtime": realtime.REALTIME,
 }
-"""The figures of `all`, in this order."""
 
 
 def chosen(names: Sequence[str]) -> list[Recipe]:

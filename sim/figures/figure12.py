@@ -25,7 +25,6 @@ _SLOW_S, _FAST_S = 1.0, 0.1
 _EARLY_S: Final = 55.0
 _MANY: Final = 30
 _SWARM: Final = Possible(0, 45)
-"""The possible numbers of UAVs."""
 _NEARLY_ALL: Final = 43
 _FEW: Final = 5
 _WINDOW_S: Final = (50.0, 70.0)

@@ -136,7 +136,6 @@ class Claim:
 
     figure: int
     claim: str
-    """What the paper says."""
     statements: Sequence[Statement]
     reasons: Sequence[Reason] = ()
 

@@ -33,7 +33,6 @@ class Recipe:
     """The name of its files, for example `figure-9`."""
     title: str
     sweep: str
-    """The shipped sweep that it is made of."""
     caption: str
     """The caption: what is drawn, how it was run, and what can be seen."""
     draw: Callable[[Runs], Drawing]

@@ -46,7 +46,6 @@ LOOKS: Final[Mapping[str, Look]] = {
     CONTROL: Look("plain flooding, cw_min 1", GRAY, "x", (0, (2, 1))),
     "limit": Look("a path exists", "#000000", "", (0, (1, 2))),
 }
-"""The look of each case of a sweep."""
 SERIES: Final = (
     Look("", BLUE, "o", "-"),
     Look("", RED, "s", "--"),

@@ -74,7 +74,6 @@ class BusFeed:
             self.bus.close()
             raise
         self.clock: SwarmClock | None = None
-        """The clock of the swarm; None before it runs."""
         self.time_scale = self.scenario.time_scale
         self.over = False
         """True once the swarm's time is over, or its clock was stopped."""

@@ -25,7 +25,6 @@ class Surroundings(NamedTuple):
     hills: Hills | None
     boxes: Sequence[Box]
     no_fly: Sequence[Sequence[tuple[float, float]]]
-    """The outlines of no-fly areas."""
     half_m: float
 
     def on_ground(self, at: Enu, *, above_m: float = 0.0) -> Enu:

@@ -160,7 +160,6 @@ class SwarmState(Observer):
         self.t_ns = 0
         self.uavs: dict[int, UavNow] = {}
         self.reports: dict[int, Mapping[str, Any]] = {}
-        """The last report of each UAV."""
         self.emulator: Mapping[str, Any] = {}
         self._air: deque[tuple[int, float]] = deque()
         """Instants, and the time [ns] for which the air was busy until then, of the last seconds."""

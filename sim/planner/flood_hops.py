@@ -22,7 +22,6 @@ class FloodHops(NamedTuple):
     most: int
     """The number of hops to the farthest node that the flood reaches."""
     missed: tuple[NodeId, ...]
-    """The nodes that the flood does not reach."""
 
 
 def flood_hops(table: Timetable, adjacency: Adjacency, geometry: Geometry) -> Mapping[NodeId, FloodHops]:

@@ -21,7 +21,6 @@ B = TypeVar("B", bound=Record)
 C = TypeVar("C", bound=Record)
 D = TypeVar("D", bound=Record)
 KINDS: Final[tuple[type[Any], ...]] = tuple(sorted(get_args(Record), key=trace.name_of))
-"""All kinds of records, sorted by name."""
 CODES: Final = {kind: code for code, kind in enumerate(KINDS)}
 """The number of each kind, its index in `KINDS`, by which a log on disk names the kind of a record."""
 

@@ -51,7 +51,6 @@ class Spool:
         self.size = 0
         """The length of the file, up to the end of its last complete item."""
         self.count = 0
-        """The number of items."""
         self.failure: str | None = None
         """Why no more items are accepted; None while they are."""
 

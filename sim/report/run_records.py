@@ -62,7 +62,6 @@ class RunRecords:
     reports_delivered: list[Delivered] = field(default_factory=list)
     let_out: list[LetOut] = field(default_factory=list)
     heads: dict[int, int] = field(default_factory=dict)
-    """The last head of each node."""
     roles: dict[int, list[RoleChanged]] = field(default_factory=lambda: defaultdict(list))
     """The roles of each node, in the order of time."""
     mission: list[

@@ -21,7 +21,6 @@ from sim.report.run_pictures import RunPicture
 from sim.report.run_records import RunRecords
 
 _CLUSTERS: Final = (BLUE, RED, GREEN, PINK, ORANGE)
-"""The colors of clusters, in turn."""
 _MOST_NAMED: Final = 12
 """The greatest number of slots that are named above them."""
 _MOST_LINES: Final = 1000

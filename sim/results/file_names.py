@@ -5,7 +5,6 @@ from typing import Final
 
 SUMMARY_FILE: Final = "summary.json"
 SCENARIO_FILE: Final = "scenario.toml"
-"""The resolved scenario."""
 REPORTS_FILE: Final = "reports.json"
 LINKS_FILE: Final = "links.json"
 TRACE_FILE: Final = "trace.jsonl"

@@ -30,7 +30,6 @@ class Outcome:
     taps: Collection[tuple[int, bytes]] = ()
     """Pairs (instant ns, MAVLink bytes) for `mavlink.tlog`."""
     links: LinkTotals = field(default_factory=LinkTotals)
-    """The statistics of all links."""
     ended: list[tuple[str, int]] = field(default_factory=list)
     """Name and exit code of each process that ended too early."""
     aborted: str | None = None

@@ -40,7 +40,6 @@ class UavState(NamedTuple):
     role: str
     """Its role in its cluster; empty if it had none yet."""
     head: int
-    """The head of its cluster; 0 if it had none."""
 
 
 class Replay:

@@ -190,7 +190,6 @@ class RunFolder:
         path = folder / SUMMARY_FILE
         self.text = read_regular(path, most_bytes=_MOST_BYTES, follow=False)
         self.summary: Mapping[str, Any] = json_of(self.text, source=str(path))
-        """The content of `summary.json`."""
         if isinstance(self.summary, dict) and not self.summary.get("files", True) and not self.summary.get("valid"):
             raise ConfigError(f"{folder}: the run did not end, so its files are not whole; run it again with --force")
         found = checked(TypeAdapter(_ShownSummary), self.summary, path)

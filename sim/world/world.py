@@ -148,7 +148,6 @@ class WorldActor(Actor):
         self._adrift = np.zeros(len(self._ids), bool)
         """The UAVs that sink without knowing their places and velocities."""
         self._flies = np.ones(len(self._ids), bool)
-        """The UAVs that have not crashed."""
         self._falling: set[int] = set()
         """The UAVs that fall by a fault, and whose sensors and radio work until they hit something."""
         if flight is not None and scenario.world.crash == "falls":

@@ -35,7 +35,6 @@ _LOW_M: Final = 25.0
 _TURN_S: Final = 14.0
 """The time between two landings beside each other."""
 _LAND_M_S: Final = 1.5
-"""The speed of the landing."""
 _SEEN_NS: Final = 1_500 * MS
 """A UAV goes on towards its pad for this long after it last saw the marker."""
 _SEEN_GAIN: Final = 0.3
@@ -62,7 +61,6 @@ class ReturnReason(StrEnum):
     LOST_POSITION = "lost_position"
     """Its receiver has told no position for too long."""
     DONE = "done"
-    """The search is over."""
     RECALLED = "recall"
     """The post on the ground has ordered it."""
 

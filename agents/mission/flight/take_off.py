@@ -11,7 +11,6 @@ from fanet_mw.application import Course
 from fanet_mw.units import Enu, NodeId, S, seconds_to_ns
 
 _CLIMB_M_S: Final = 2.5
-"""The speed of the climb."""
 _LISTEN_NS: Final = 3 * S
 """How long a UAV listens before it takes off, to learn from hellos who stands beside it."""
 _PATIENCE_NS: Final = 40 * S

@@ -43,7 +43,6 @@ _CALLER: Final = 0.6
 _MOST_M: Final = 60.0
 """The spiral begins anew at the estimated place when it is this wide."""
 _SINK_M_S: Final = 2.0
-"""The mean speed of the descent."""
 
 
 def hearing_m(scenario: Scenario) -> float:

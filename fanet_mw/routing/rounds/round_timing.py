@@ -40,7 +40,6 @@ class Block(NamedTuple):
     """The end of its turns."""
     end_ns: int
     turns_before: int
-    """The turns of the round before this block."""
     slots_before: int
     slots: int
 

@@ -72,7 +72,6 @@ class Town(NamedTuple):
 
     boxes: tuple[Footprint, ...]
     buildings: int
-    """The number of buildings in the file."""
     guessed: tuple[str, ...]
     """The buildings within the area of which a tag could not be read as it is written."""
     untold: int

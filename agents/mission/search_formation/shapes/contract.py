@@ -107,14 +107,12 @@ class Demands(NamedTuple):
     """The requirements that a formation is fitted to: the square area that it sweeps, and the reach of receivers."""
 
     area_m: float
-    """The side of the area."""
     seen_m: float
     """The distance to the side of a lane at which a phone on the ground is received, without shadowing."""
     reach_m: float
     """The reach of the radio."""
     height_m: float
     speed_m_s: float
-    """The speed of the sweep."""
     base_m: tuple[float, float] = (0.0, 0.0)
     """East and north of the place where the UAVs start."""
 
@@ -139,9 +137,7 @@ class Dimensions(NamedTuple):
     lanes: int
     """The number of places of each team."""
     relays: int
-    """The number of relays."""
     followers: int
-    """The number of followers."""
     half_width_m: float
     """Lines: how far east and west of the middle the outermost lanes are. Other shapes: half the side of the area."""
     first_m: float
@@ -201,7 +197,6 @@ class Swarm(NamedTuple):
     sides_m: tuple[float, float, float, float]
     """How far from the middle of the area they are to the east, west, north and south."""
     reach_m: float
-    """The reach of their radios."""
 
     @property
     def apart_m(self) -> float:

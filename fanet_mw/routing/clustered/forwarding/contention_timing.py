@@ -14,7 +14,6 @@ Random = Callable[[], float]
 _SHARE: Final = 4
 """The data of one node take this part of a window at most: what is more would be sent beyond it, into turns."""
 _WINDOWS: Final = 256
-"""So many windows are remembered."""
 
 
 class ContentionTiming:

@@ -32,7 +32,6 @@ class Geometry(NamedTuple):
     interference_m: float
     """The greatest distance at which a sender disturbs a receiver of another frame."""
     turns: int
-    """The number of turns in a superframe."""
     hop_turns: int
     """The turns from the one in which a packet arrives to the first that can relay it; 1: the next turn."""
     margin_m: float = 0.0

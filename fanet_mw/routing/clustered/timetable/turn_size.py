@@ -49,7 +49,6 @@ _SCHEDULE_BYTES: Final = SCHEDULE.layout.size + OVERHEAD
 _PLACES_BYTES: Final = PLACES.layout.size + OVERHEAD
 _MOST_DIGESTS: Final = 4
 _HELLO_BYTES: Final = 200
-"""The size of a hello without its digest."""
 _MOST_PERIODS: Final = 4
 """The greatest length of a superframe with measured links, in flooding periods."""
 LOAD: Final = 0.9

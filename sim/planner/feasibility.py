@@ -106,7 +106,6 @@ def evaluate(
         clusters=judged.clusters,
         classes=summed,
         access=access,
-        uplink_ns=uplink_ns,
         paper=_paper(judged.clusters, scenario),
         superframe=judged.superframe,
         cut_off=judged.cut_off,
@@ -186,7 +185,7 @@ def _shares(site: Site, head: NodeId, load: Sequence[int], classes: Sequence[Tra
     """The load of each class at a head. In a timetable, the longest packet determines the length of a turn."""
     if site.timetable:
         turn_ns = superframe(site.scenario).turn_ns
-        turn = FloodCost(turn_ns, turn_ns, 1, proven=True)
+        turn = FloodCost(turn_ns, turn_ns, proven=True)
         return [
             ClassLoad(n, c.interval_ns, turn, c.priority, c.payload_bytes) for n, c in zip(load, classes, strict=True)
         ]
@@ -297,7 +296,7 @@ def _in_slot(
         usable_ns=usable_ns,
         work_ns=work_ns(shares, period_ns=period_ns),
         packets=sum(s.sources * period_ns / s.interval_ns for s in shares),
-        flood=max((s.flood for s in shares), key=lambda f: f.duration_ns, default=FloodCost(0, 1, 0, proven=True)),
+        flood=max((s.flood for s in shares), key=lambda f: f.duration_ns, default=FloodCost(0, 1, proven=True)),
         delays=tuple(delays),
         backlog=backlog,
     )

@@ -14,11 +14,10 @@ from fanet_mw.units import MS, NodeId
 
 
 class FloodCost(NamedTuple):
-    """From the head's first bit to the last node's reception; from one flood to the next; and the number of frames."""
+    """From the head's first bit to the last node's reception, and from one flood to the next."""
 
     duration_ns: int
     spacing_ns: int
-    transmissions: int
     proven: bool
 
 
@@ -35,9 +34,8 @@ def flood_cost(scenario: Scenario, adjacency: Adjacency, root: NodeId, *, payloa
     local_ns = round(sharing * relay_share(scenario, adjacency) * per_frame_ns)
     wait_ns = clusters.assess_ms * MS if clusters.relay == "counter" else 0
     per_hop_ns = round(scenario.routing.jitter_ns + wait_ns + radio.handover_ns + radio.lead_ns + local_ns)
-    transmissions = 1 + round((len(hops) - 1) * relay_share(scenario, adjacency))
     spacing_ns = max(local_ns, round(clusters.release_gap_ms * MS))
-    return FloodCost(max(1, max(hops.values())) * per_hop_ns, spacing_ns, transmissions, proven=False)
+    return FloodCost(max(1, max(hops.values())) * per_hop_ns, spacing_ns, proven=False)
 
 
 def relay_share(scenario: Scenario, adjacency: Adjacency) -> float:

@@ -18,7 +18,6 @@ class ScenarioPlan(NamedTuple):
     clusters: tuple[ClusterPlan, ...]
     classes: tuple[ClassPlan, ...]
     access: DelayBound
-    uplink_ns: int
     paper: DelayBound
     """The estimate of the paper's equations (1)-(4) for the cluster with the greatest load, for comparison only."""
     superframe: TimetablePlan | None

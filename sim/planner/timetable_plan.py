@@ -120,7 +120,6 @@ def judge(
         _Room(own, lead_ns, jitter_ns, control, _of(priority, candidate.shares), part_bytes)
         for priority in sorted({share.priority for share in candidate.shares})
     ]
-    relays = sum(1 for turn in floods if turn.instance == 0)
     fullest = max(rooms, key=lambda room: room.turns_needed, default=None)
     waiting = [room.backlog() for room in rooms if room.packets]
     return ClusterPlan(
@@ -131,7 +130,7 @@ def judge(
         usable_ns=len(offsets) * turns.turn_ns,
         work_ns=round(fullest.turns_needed * turns.turn_ns) if fullest else 0,
         packets=fullest.packets if fullest else 0,
-        flood=FloodCost(_flood_ns(own), turns.turn_ns, relays, proven=True),
+        flood=FloodCost(_flood_ns(own), turns.turn_ns, proven=True),
         delays=tuple(next(room.delay(share) for room in rooms if share in room.shares) for share in candidate.shares),
         backlog=sum(n for n in waiting if n is not None) if waiting and None not in waiting else None,
     )

@@ -71,7 +71,7 @@ def heads(draw):
 
 
 def cost(spacing: int, duration: int | None = None) -> FloodCost:
-    return FloodCost(duration or spacing, spacing, 1, proven=True)
+    return FloodCost(duration or spacing, spacing, proven=True)
 
 
 @examples(50)

@@ -1,10 +1,12 @@
 """One UAV as a process: `python -m agents SCENARIO.toml --id N`, or `fanet agent`. Needs neither numpy nor physics."""
 
+import argparse
 import asyncio
 import contextlib
 import json
 import sys
 from collections.abc import AsyncIterator, Callable, Mapping
+from pathlib import Path
 from typing import Final, NamedTuple
 
 from agents.clock.clocked_uav import ClockedUav, make_uav
@@ -14,17 +16,19 @@ from agents.uav import Uav
 from fanet_mw.autopilot.link import AutopilotLink
 from fanet_mw.autopilot.serving import Autopilot, AutopilotBus
 from fanet_mw.bus.topics import Topics
-from fanet_mw.errors import ConfigError
+from fanet_mw.errors import ConfigError, FanetError
 from fanet_mw.flavors import Flavor
 from fanet_mw.gateway.connections import Address, address_of
 from fanet_mw.geodesy import Geodetic
 from fanet_mw.hosts import interrupts, loop, service
-from fanet_mw.hosts.bus import Bus, HostBus, config_of
+from fanet_mw.hosts.bus import Bus, HostBus, config_of, exposure
 from fanet_mw.hosts.clock import START_PATIENCE_S
 from fanet_mw.hosts.realtime import RealtimeHost, SwarmAddress
 from fanet_mw.radios.udp import PORT
-from fanet_mw.scenario import Scenario
+from fanet_mw.scenario import Scenario, config
 from fanet_mw.units import Enu, NodeId
+
+_DEFAULT_ENDPOINT: Final = "tcp/127.0.0.1:7447"
 
 
 class FlightController(NamedTuple):
@@ -170,7 +174,17 @@ def start(
 
 
 def main() -> int:
-    flags = service.parser("agents", "Run one UAV against a router.")
+    """Exit codes: 0 the swarm's time is over or its clock was stopped, 2 the request was wrong, 3 the bus could not be
+    used or was lost, 130 SIGINT, 143 SIGTERM, 129 SIGHUP.
+    """
+    flags = argparse.ArgumentParser(prog="python -m agents", description="Run one UAV against a router.")
+    flags.add_argument("scenario", type=Path, help="scenario file, the same for all services of a swarm")
+    flags.add_argument("--connect", default=_DEFAULT_ENDPOINT, help="Zenoh endpoint of the router (%(default)s)")
+    flags.add_argument(
+        "--zenoh-config", type=Path, metavar="FILE", help="Zenoh's own configuration, JSON5: TLS and the like"
+    )
+    flags.add_argument("--swarm", help="name of the swarm; by default the scenario's")
+    flags.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="change one scenario key")
     flags.add_argument("--id", type=int, required=True, help="node id, from 1 to the number of nodes")
     flags.add_argument(
         "--at", type=float, nargs=3, default=(0.0, 0.0, 0.0), metavar=("E", "N", "U"),
@@ -183,15 +197,25 @@ def main() -> int:
     flags.add_argument("--autopilot", help="its flight controller: udpin:HOST:PORT, tcpout:, serial:DEVICE:BAUD ...")
     flags.add_argument("--flavor", choices=[*Flavor], default="px4", help="of the flight controller (%(default)s)")
     given = flags.parse_args()
-
-    def begin(scenario: Scenario, address: SwarmAddress) -> int:
-        radio = Radio(given.radio_address, given.radio_broadcast, given.radio_port, given.epoch)
+    interrupts.install()
+    try:
+        scenario = config.load(given.scenario, given.set)
+        if (warning := exposure(given.connect, listens=False)) is not None:
+            _tell(warning)
         return start(
-            scenario, address, node=NodeId(given.id), position=Enu(*given.at), radio=radio,
-            autopilot=given.autopilot, flavor=given.flavor,
-        )  # fmt: skip
-
-    return service.serve(given, begin)
+            scenario,
+            SwarmAddress(given.swarm or scenario.name, given.connect, given.zenoh_config),
+            node=NodeId(given.id),
+            position=Enu(*given.at),
+            radio=Radio(given.radio_address, given.radio_broadcast, given.radio_port, given.epoch),
+            autopilot=given.autopilot,
+            flavor=given.flavor,
+        )
+    except FanetError as error:
+        _tell(str(error))
+        return 2 if isinstance(error, ConfigError) else service.BUS_EXIT_CODE
+    except KeyboardInterrupt as interrupt:
+        return interrupts.exit_code(interrupt)
 
 
 if __name__ == "__main__":

@@ -78,8 +78,8 @@ def emulator(
         pcap_receptions: Write every reception too, with its RSSI.
 
     """
-    from emulator.__main__ import run
     from emulator.compile_kernel import COMPILING_NOTICE, must_compile
+    from emulator.process import run
 
     chosen = choice.realtime_scenario(scenario)
     if must_compile():
@@ -96,7 +96,7 @@ def world(
         scenario: The scenario of the swarm.
 
     """
-    from sim.world.__main__ import run
+    from sim.world.process import run
 
     chosen = choice.realtime_scenario(scenario)
     return run(chosen, join.address(chosen))

@@ -17,7 +17,7 @@ import sys
 from collections.abc import Mapping
 from typing import Any, Final
 
-from emulator.__main__ import run as run_emulator
+from emulator.process import run as run_emulator
 from fanet_mw.actor import Actor
 from fanet_mw.bus.messages import MavlinkTap, Message, Reception, TxRequest
 from fanet_mw.bus.topics import Topics
@@ -29,7 +29,7 @@ from fanet_mw.scenario import Scenario, config
 from fanet_mw.units import MS, NodeId, S
 from sim.run.launcher.child_processes import Processes
 from sim.run.launcher.swarm import Collector, free_endpoint
-from sim.world.__main__ import run as run_world
+from sim.world.process import run as run_world
 
 NAMES: Final = Topics("relay")
 PAIRS: Final = 22

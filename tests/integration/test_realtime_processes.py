@@ -313,8 +313,8 @@ def test_a_router_that_is_interrupted_stops_the_services_it_kept_time_for(
     said(router, "serving")
     common = (str(path), "--connect", endpoint)
     services = [
-        start(mark, "emulator", *common, deaf=deaf),
-        start(mark, "sim.world.__main__", *common, deaf=deaf),
+        start(mark, "sim.cli.app", "emulator", *common, deaf=deaf),
+        start(mark, "sim.cli.app", "world", *common, deaf=deaf),
         *(start(mark, "agents", *common, "--id", str(node), deaf=deaf) for node in (1, 2)),
     ]
     said(router, "the clock runs")

@@ -27,7 +27,7 @@ from sim.results.outcome import described
 from sim.run.launcher import process_setup
 from sim.run.launcher.process_setup import be_killed_with_parent
 
-_PRELOAD: Final = ["agents.__main__", "emulator.__main__", "sim.world.__main__", "sim.run.launcher.services"]
+_PRELOAD: Final = ["agents.__main__", "emulator.process", "sim.world.process", "sim.run.launcher.services"]
 _NICENESS: Final = 4
 """Added to the launcher's. With 10, two busy loops beside `rescue` on two processors slow the swarm's clock to 0.56;
 with 4 it stays at 1, and the emulator still goes first."""

@@ -14,13 +14,13 @@ from sim.world.environment.layout import positions
 
 
 def run_emulator(**arguments: Any) -> int:  # noqa: ANN401
-    from emulator.__main__ import run
+    from emulator.process import run
 
     return run(**arguments)
 
 
 def run_world(**arguments: Any) -> int:  # noqa: ANN401
-    from sim.world.__main__ import run
+    from sim.world.process import run
 
     return run(**arguments)
 

@@ -84,7 +84,7 @@ async def test_a_swarm_of_processes_lives_by_its_clock(tmp_path: Path, time_scal
 async def test_a_machine_that_cannot_keep_up_slows_the_clock_if_it_may(slow_down_to: float | None) -> None:
     """At 80 times real time no machine wakes ten processes in time."""
     said: list[str] = []
-    changes = ["time_scale=80", "duration_s=240", "drain_s=10", "traffic.interval_s=0.2"]
+    changes = ["time_scale=80", "duration_s=320", "drain_s=10", "traffic.interval_s=0.2"]
     scenario = catalog.find("quick", [*changes, "world.engine=kinematic", "mission.survivors=0"])
     outcome = await launch(scenario, swarm="hurried", slow_down_to=slow_down_to, on_event=said.append)
     summary = finish(outcome, out=None)
@@ -93,10 +93,10 @@ async def test_a_machine_that_cannot_keep_up_slows_the_clock_if_it_may(slow_down
     assert sum("slows to" in text for text in said) == sum(falls)
     if slow_down_to is None:
         assert scales == []
-        assert summary["wall_s"] < 240 / 80 + 2 + outcome.stall_ms / 1000
+        assert summary["wall_s"] < 320 / 80 + 2 + outcome.stall_ms / 1000
     else:
         assert 5.0 <= min(scales) < 80
         assert sum(pace["wall_s"] for pace in summary["paces"]) == pytest.approx(summary["wall_s"], rel=0.2)
-        assert summary["wall_s"] > 240 / 80 + 0.5
+        assert summary["wall_s"] > 320 / 80 + 0.5
     assert summary["frames"]["unaccounted"] == 0
     assert not summary["processes"]["ended"]

@@ -14,7 +14,7 @@ from fanet_mw.node.neighbors import Neighbors, neighbor_lifetime_ns
 from fanet_mw.node.queue import TxQueue
 from fanet_mw.routing.clustered.clustered import Clustered, Parts
 from fanet_mw.routing.clustered.contract import HearsCopies, ScheduledAccess
-from fanet_mw.routing.clustered.forwarding.contending_relays import ContendingRelaying, CounterRule, RelayAll, Rule
+from fanet_mw.routing.clustered.forwarding.contending_relays import ContendingRelaying
 from fanet_mw.routing.clustered.forwarding.contention_timing import ContentionTiming
 from fanet_mw.routing.clustered.forwarding.floods import Floods
 from fanet_mw.routing.clustered.forwarding.gradient import Gradient
@@ -114,15 +114,14 @@ def _ground(port: Port) -> _Ground:
 
 
 def _by_counter(ground: _Ground) -> Clustered:
-    rule = CounterRule(ground.port.scenario.clusters, ground.random)
-    return _in_slots(ground, rule, rule.open_until)
+    relaying = ContendingRelaying(ground.port, ground.contention, delays=ground.random)
+    return _in_slots(ground, relaying, relaying.open_until)
 
 
-def _in_slots(ground: _Ground, rule: Rule, *hear_copies: HearsCopies) -> Clustered:
+def _in_slots(ground: _Ground, relaying: ContendingRelaying, *hear_copies: HearsCopies) -> Clustered:
     parts = _role_parts(ground, takes_slot=True)
     access = _slots(ground, parts.membership)
     roles = _roles(ground, parts, access, NoTimetable())
-    relaying = ContendingRelaying(ground.port, rule, ground.contention)
     whole = Parts(
         neighbors=ground.neighbors, gradient=ground.gradient, uplink=ground.uplink, repair=ground.repair,
         floods=ground.floods, roles=roles, access=access, relaying=relaying, contending=relaying,
@@ -179,7 +178,7 @@ def _by_timetable(ground: _Ground) -> Clustered:
         access=access,
         followers=followers,
     )
-    contending = ContendingRelaying(port, RelayAll(), ground.contention)
+    contending = ContendingRelaying(port, ground.contention)
     relaying = ScheduledRelaying(
         port, timetables, contending, resumed=resumed, repair=ground.repair, missing=ground.missing, followers=followers
     )
@@ -259,7 +258,7 @@ def _protocol(ground: _Ground, whole: Parts, *hear_copies: HearsCopies) -> Clust
 
 
 RELAYS: Final[Mapping[str, Callable[[_Ground], Clustered]]] = {
-    "all": lambda ground: _in_slots(ground, RelayAll()),
+    "all": lambda ground: _in_slots(ground, ContendingRelaying(ground.port, ground.contention)),
     "counter": _by_counter,
     "scheduled": _by_timetable,
 }

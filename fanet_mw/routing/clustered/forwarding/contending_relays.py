@@ -1,14 +1,14 @@
-"""Relaying in contention: after a random jitter, a packet is passed on if a rule says so; urgent control always is.
+"""Relaying in contention: a node passes on each packet after a random jitter, unless others have done so.
 
     all      the node passes on each packet, at once
     counter  it passes on a packet after a random delay, unless it has heard enough copies by then
 
-`counter` is after Ni et al. (MobiCom 1999, 3.2): in a sparse swarm all relay, in a dense one few do. Where a timetable
-decides: `timetable/scheduled_relaying.py`.
+Urgent control goes at once. `counter` is after Ni et al. (MobiCom 1999, 3.2): in a sparse swarm all relay, in a dense
+one few do. Where a timetable decides: `timetable/scheduled_relaying.py`.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Final, Protocol
+from typing import Final
 
 from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason
@@ -16,42 +16,7 @@ from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet, Relay, is_used_up
 from fanet_mw.routing.clustered.forwarding.contention_timing import ContentionTiming
 from fanet_mw.routing.random_assessment_delay import Assessment
-from fanet_mw.scenario import Clusters
 from fanet_mw.units import MS
-
-
-class Rule(Protocol):
-    """The decisions of one node. `open_until` is empty if the rule decides at once."""
-
-    open_until: Assessment
-    """The packets about which it is not decided yet whether they are relayed."""
-
-    def relays_now(self, packet: Packet, *, now_ns: int) -> bool:
-        """True if a new packet is relayed now; False if it is not, or if that is still open."""
-
-
-class RelayAll:
-    """Every packet is relayed at once."""
-
-    def __init__(self) -> None:
-        self.open_until = Assessment(enough=1)
-
-    def relays_now(self, packet: Packet, *, now_ns: int) -> bool:
-        return True
-
-
-class CounterRule:
-    """A packet is relayed after a random delay, unless enough other nodes have relayed it by then."""
-
-    def __init__(self, clusters: Clusters, random: Callable[[], float]) -> None:
-        self.open_until = Assessment(enough=clusters.counter)
-        self._assess_ns = round(clusters.assess_ms * MS)
-        self._random = random
-
-    def relays_now(self, packet: Packet, *, now_ns: int) -> bool:
-        self.open_until.first_copy(packet, due_ns=now_ns + int(self._random() * self._assess_ns))
-        return False
-
 
 _CONTROL_JITTER_NS: Final = 100 * MS
 _NOTHING: Final[Mapping[str, object]] = {}
@@ -60,12 +25,16 @@ _NOTHING: Final[Mapping[str, object]] = {}
 class ContendingRelaying:
     """The relays of one node (`contract.Relaying`), which go as soon as they may contend."""
 
-    def __init__(self, port: Port, rule: Rule, contention: ContentionTiming) -> None:
+    def __init__(self, port: Port, contention: ContentionTiming, *, delays: Callable[[], float] | None = None) -> None:
+        """`delays` draws the shares of `clusters.assess_ms` that `counter` waits; without it all is relayed at once."""
+        clusters = port.scenario.clusters
         self._port = port
-        self._rule = rule
         self._contention = contention
         self._jitter_ns = port.scenario.routing.jitter_ns
-        self.next_wake_ns = rule.open_until.next_wake_ns
+        self._delays, self._assess_ns = delays, round(clusters.assess_ms * MS)
+        self.open_until = Assessment(enough=clusters.counter)
+        """The packets about which it is not decided yet whether they are relayed."""
+        self.next_wake_ns = self.open_until.next_wake_ns
         """Tells when a packet is decided whose relay is still open; called after every reception."""
 
     def start(self, now_ns: int) -> None:
@@ -80,12 +49,13 @@ class ContendingRelaying:
             return ()
         if at_once:
             return (self._relay(packet, _CONTROL_JITTER_NS, now_ns, membership=True),)
-        if self._rule.relays_now(packet, now_ns=now_ns):
+        if self._delays is None:
             return (self._relay(packet, self._jitter_ns, now_ns),)
+        self.open_until.first_copy(packet, due_ns=now_ns + int(self._delays() * self._assess_ns))
         return ()
 
     def decided(self, now_ns: int) -> Sequence[Relay]:
-        decided = self._rule.open_until.decided(now_ns=now_ns)
+        decided = self.open_until.decided(now_ns=now_ns)
         start_ns = self._contention.start_ns
         return [(packet, start_ns(due_ns=due_ns, now_ns=now_ns)) for due_ns, packet in decided] if decided else ()
 
@@ -94,7 +64,7 @@ class ContendingRelaying:
         return packet, start_ns(due_ns=now_ns, now_ns=now_ns, jitter_ns=jitter_ns, membership=membership)
 
     def waiting(self) -> int:
-        return len(self._rule.open_until)
+        return len(self.open_until)
 
     def report(self) -> Mapping[str, object]:
         return _NOTHING

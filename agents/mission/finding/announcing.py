@@ -1,9 +1,10 @@
-"""What one UAV floods about survivors: estimates while it responds, and its verdicts until all nodes know them.
+"""What one UAV floods about survivors: estimates while it or nobody responds, and verdicts until all nodes know them.
 
 A verdict (confirmed, refuted, or a person without a phone) is flooded three times, then said in hellos for a while, and
 again when another UAV does not seem to know of it. Whoever hears a lost UAV again floods all verdicts of some time.
 """
 
+from collections.abc import Iterable
 from typing import Final
 
 from agents.mission.finding.identities import paired
@@ -142,8 +143,10 @@ class Announcing:
         self._heard_ns[survivor] = now_ns
         self._told.pop(survivor, None)
 
-    def tell(self, task: int | None, now_ns: int) -> None:
-        """Flood the verdicts that are due, and the estimate of the survivor to whom this UAV flies."""
+    def tell(self, task: int | None, now_ns: int, *, unattended: Iterable[int] = ()) -> None:
+        """Flood the verdicts that are due, and the estimate of the survivor to whom this UAV flies, or nobody
+        (`unattended`) if none that was told is nearly as good.
+        """
         if self._meets_ns is not None and now_ns >= self._meets_ns:
             self._meets_ns = None
             self._tell_all(now_ns)
@@ -159,6 +162,19 @@ class Announcing:
                 del self._tellings[survivor]
         if task is not None:
             self._tell_estimate(task, now_ns)
+        for survivor in unattended:
+            if self._places_best(survivor):
+                self._tell_estimate(survivor, now_ns)
+
+    def _places_best(self, survivor: int) -> bool:
+        """True for a UAV that has received the phone and places it clearly better than whoever has told: a UAV that
+        passes beside it may not know that it does.
+        """
+        known = self._survivors.by_id[survivor]
+        own = known.own_place()
+        if own is None or own.is_vague or self._node not in known.reporters:
+            return False
+        return known.announced is None or own.sigma_m <= _IMPROVEMENT * estimate_of(known.announced).sigma_m
 
     def reported(self, report: Survivor, now_ns: int) -> None:
         """Another node reports a survivor, so it may not know yet that the survivor is confirmed."""

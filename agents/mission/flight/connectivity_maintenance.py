@@ -100,10 +100,12 @@ class ConnectivityMaintenance:
         return planes + closer  # who cannot follow so close stays in reach
 
     def _led(self, ties: dict[NodeId, Motion], offsets: dict[NodeId, Enu], now_ns: int) -> list[HalfPlane]:
-        """The limits that keep a UAV without a task near those who respond, before the sweep."""
-        if self._bidding.survivor is not None or self._formation.is_taken_up(now_ns):
+        """The limits that keep a UAV without a task near those who respond, before the sweep, and one that responds
+        after others near those who are first: at the end of its links it would hold them back.
+        """
+        if self._bidding.is_first(now_ns) or self._formation.is_taken_up(now_ns):
             return []
-        responding = self._bidding.responders(now_ns)
+        responding = self._bidding.responders(now_ns, first=self._bidding.survivor is not None)
         planes = [
             self._plane(offsets[node], ties[node].velocity, _LED, _CLOSING_S)
             for node in sorted(ties)

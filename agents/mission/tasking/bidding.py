@@ -216,9 +216,18 @@ class Bidding:
             return False
         return not self._is_within_limits(self._survivors.by_id[self.survivor].place(), now_ns)
 
-    def responders(self, now_ns: int) -> set[int]:
-        """The UAVs that have won a task, as far as this one knows."""
-        return {node for survivor in self._survivors.sought() for node in self._winners(survivor, now_ns)}
+    def responders(self, now_ns: int, *, first: bool = False) -> set[int]:
+        """The UAVs that have won a task, as far as this one knows; `first`: those who arrive before all others."""
+        most = 1 if first else None
+        return {node for survivor in self._survivors.sought() for node in self._winners(survivor, now_ns)[:most]}
+
+    def unattended(self, now_ns: int) -> list[int]:
+        """The survivors to whom nobody flies."""
+        return [survivor for survivor in self._survivors.sought() if not self._winners(survivor, now_ns)]
+
+    def is_first(self, now_ns: int) -> bool:
+        """True if no other UAV arrives at the survivor before this one does."""
+        return self.survivor is not None and self._winners(self.survivor, now_ns)[:1] == [self._node]
 
     def _announce(self, survivor: int, now_ns: int) -> None:
         known = self._survivors.by_id[survivor]

@@ -2,6 +2,7 @@
 
 import math
 
+import pytest
 from search_board import FOLLOWER, MODEL, UP_M, Board
 
 from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, Estimate
@@ -9,6 +10,12 @@ from fanet_mw.trace import Confirmed, Refuted
 from fanet_mw.units import Enu, NodeId, S
 from fanet_mw.wire.search_messages import told_in
 from fanet_mw.wire.survivors import Found, Standing, Survivor
+
+
+def estimated(board: Board) -> list[Found]:
+    """The estimates that were flooded."""
+    told = [message for packet in board.out.packets for message in told_in(bytes(36) + packet.frames)]
+    return [message for message in told if isinstance(message, Found) and message.standing is Standing.ESTIMATED]
 
 
 def confirmed(board: Board) -> list[Found]:
@@ -98,3 +105,23 @@ def test_those_who_hear_it_take_turns() -> None:
                 began.add(now_ns)
                 break
     assert len(began) == 6
+
+
+@pytest.mark.parametrize(
+    ("hears_it", "told_m", "tells"),
+    [(True, None, 1), (True, 90.0, 1), (True, 5.0, 0), (False, None, 0)],
+    ids=["nobody has told", "somebody knows less", "somebody knows as much", "has not received the phone"],
+)
+def test_where_nobody_responds_who_receives_a_phone_and_places_it_best_tells_its_estimate_once(
+    hears_it: bool, told_m: float | None, tells: int
+) -> None:
+    board, truth = Board(FOLLOWER, Enu(0, 0, UP_M)), Enu(100, 20, 0)
+    board.hear(1, truth, range(1, 5), now_ns=0)
+    if hears_it:
+        board.hear(1, truth, range(FOLLOWER, FOLLOWER + 1), now_ns=0)
+    if told_m is not None:
+        told = Found(1, 1, 150, 20, told_m**2, 0, told_m**2, NodeId(3), Standing.ESTIMATED)
+        board.survivors.on_found(told, now_ns=0)
+    for second in range(5):
+        board.announcing.tell(None, second * S, unattended=[1])
+    assert len(estimated(board)) == tells

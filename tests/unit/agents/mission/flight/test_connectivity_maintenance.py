@@ -7,7 +7,7 @@ from agents.mission.flight.connectivity_maintenance import ConnectivityMaintenan
 from agents.mission.navigation.half_planes import nearest
 from fanet_mw.motion import Motion
 from fanet_mw.units import STILL, Enu, NodeId, S
-from fanet_mw.wire.search_messages import Bid
+from fanet_mw.wire.search_messages import WITHDRAWN, Bid
 
 
 def test_who_is_tied_does_not_fly_out_of_reach() -> None:
@@ -140,9 +140,10 @@ def test_a_follower_that_hears_none_of_its_team_stays_with_whom_it_hears() -> No
 @pytest.mark.parametrize(("now_ns", "drawn"), [(30 * S, True), (TAKEN_UP_NS + S, False)])
 def test_before_the_sweep_a_uav_without_a_task_follows_a_neighbor_who_responds(now_ns: int, drawn: bool) -> None:
     node, responder = NodeId(34), NodeId(35)
-    board = Board(node, Enu(0, 0, UP_M))
-    board.hear(1, Enu(300, 0, 0), range(35, 37), now_ns=now_ns)
-    board.neighbors.on_hello(responder, Motion(Enu(215, 0, UP_M), STILL, now_ns))
+    at = lane_of(node, now_ns)
+    board = Board(node, at)
+    board.hear(1, at.plus(Enu(60, 0, -at.up)), range(35, 37), now_ns=now_ns)
+    board.neighbors.on_hello(responder, Motion(at.plus(Enu(215, 0, 0)), STILL, now_ns))
     tied = ConnectivityMaintenance(
         board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M, speed_m_s=10.0
     )
@@ -152,10 +153,34 @@ def test_before_the_sweep_a_uav_without_a_task_follows_a_neighbor_who_responds(n
 
     alone_m_s = flies_m_s()
     assert alone_m_s < 0, "a little of the link is left"
-    board.tasks.merge([Bid(1, responder, 90, serial=1)], now_ns=now_ns)
+    board.tasks.merge([Bid(1, responder, 900, serial=1)], now_ns=now_ns)
     assert (flies_m_s() > 8) == drawn
+    board.tasks.bid(now_ns)
+    board.tasks.choose(now_ns)
+    assert board.tasks.is_first(now_ns), "it arrives sooner"
+    assert flies_m_s() == pytest.approx(alone_m_s), "who responds itself before others does not"
+
+
+def test_before_the_sweep_who_comes_second_for_somebody_does_not_hold_back_who_is_first_for_another() -> None:
+    node, first, now_ns = NodeId(34), NodeId(35), 30 * S
+    board = Board(node, Enu(0, 0, UP_M))
+    for survivor in (1, 2):
+        board.hear(survivor, Enu(600 * survivor - 900, 0, 0), range(35, 38), now_ns=now_ns)
+    board.neighbors.on_hello(first, Motion(Enu(215, 0, UP_M), STILL, now_ns))
+    tied = ConnectivityMaintenance(
+        board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M, speed_m_s=10.0
+    )
     board.tasks.survivor = 1
-    assert flies_m_s() == pytest.approx(alone_m_s), "who responds itself does not"
+
+    def flies_m_s() -> float:
+        return nearest((-9.0, 0.0), tied.planes(now_ns), limit=10, hard=0)[0]
+
+    board.tasks.merge([Bid(1, 36, 50, serial=1)], now_ns=now_ns)
+    alone_m_s = flies_m_s()
+    board.tasks.merge([Bid(2, 37, 50, serial=1), Bid(2, first, 90, serial=1)], now_ns=now_ns)
+    assert flies_m_s() == pytest.approx(alone_m_s), "the other one comes second as well"
+    board.tasks.merge([Bid(2, 37, WITHDRAWN, serial=2)], now_ns=now_ns)
+    assert flies_m_s() > 8
 
 
 def test_who_closes_ranks_over_a_lost_uav_may_use_up_a_little_more_of_its_reach_in_half_of_the_time() -> None:

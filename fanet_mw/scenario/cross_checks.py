@@ -231,6 +231,17 @@ def _impossible_formation(scenario: Scenario) -> Iterator[str]:
         yield f'{wanted} routing.protocol = "clustered", which makes clusters'
     if scenario.clusters.count > _MOST_CLUSTERS_ABREAST:
         yield f"{wanted} clusters.count = {scenario.clusters.count} <= {_MOST_CLUSTERS_ABREAST}"
+    if mission.formation_m >= scenario.radio.range_m:
+        yield (
+            f"mission.formation_m = {mission.formation_m:g}, at which members fly around their head, must be < "
+            f"radio.range_m = {scenario.radio.range_m:g}: they would not hear it"
+        )
+    least_m_s, _ = mission.approach_speeds_m_s
+    if scenario.mobility.speed_m_s >= least_m_s:
+        yield (
+            f"mobility.speed_m_s = {scenario.mobility.speed_m_s:g}, at which the leader flies, must be < "
+            f"mission.approach_speed_m_s = {least_m_s:g}, the greatest speed of a UAV: nobody could catch up"
+        )
 
 
 def _too_high_search(scenario: Scenario) -> Iterator[str]:

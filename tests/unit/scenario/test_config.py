@@ -144,6 +144,8 @@ def test_formation_flight_needs_clusters_and_uavs_that_fly_themselves() -> None:
         ("mission.search=lines", 'needs mission.search = "none"'),
         ("routing.protocol=flooding", 'needs routing.protocol = "clustered"'),
         ("clusters.count=8", "needs clusters.count = 8 <= 7"),
+        ("mission.formation_m=250", r"mission.formation_m = 250, .* must be < radio.range_m = 250"),
+        ("mobility.speed_m_s=10", r"mobility.speed_m_s = 10, .* must be < mission.approach_speed_m_s = 10"),
     ):
         with pytest.raises(ConfigError, match=wanted):
             catalog.find("convoy", [override])

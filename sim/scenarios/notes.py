@@ -34,7 +34,7 @@ _SIGMAS: Final = 2.0
 def notes(scenario: Scenario) -> list[str]:
     kinds = (
         _after_the_end, _without_effect, _without_place, _still_waves, _beyond_the_vehicle, _close_pads, _low_ceiling,
-        _odd_band, _guessed,
+        _high_roofs, _empty_batteries, _odd_band, _guessed,
     )  # fmt: skip
     return [note for kind in kinds for note in kind(scenario)]
 
@@ -181,6 +181,40 @@ def _low_ceiling(scenario: Scenario) -> Iterator[str]:
         yield (
             f"mobility.return_height_m = {mobility.return_height_m:g}, return_step_m = {mobility.return_step_m:g}: UAV "
             f"{scenario.nodes.count} returns at {highest_m:g} m, above mission.ceiling_m = {mission.ceiling_m:g}"
+        )
+
+
+def _high_roofs(scenario: Scenario) -> Iterator[str]:
+    """Buildings that cut links at once, which a protocol that states bounds by distances cannot foresee."""
+    world, radio, altitude_m = scenario.world, scenario.radio, scenario.nodes.altitude_m
+    protocol = scenario.routing.protocol
+    promises = protocol == "rounds" or (protocol in _CLUSTERED and scenario.clusters.relay == "scheduled")
+    if not promises or radio.channel != "range" or not radio.obstruction_loss_db or scenario.mobility.model == "static":
+        return
+    if world.buildings_geojson:
+        from sim.world.environment.obstacles import town_of
+
+        try:
+            roofs_m = [footprint.height for footprint in town_of(world).boxes]
+        except ConfigError:
+            return  # as in `_guessed`
+    elif isinstance(world.buildings, tuple):
+        roofs_m = [building[4] for building in world.buildings]
+    else:
+        roofs_m = [world.building_height_m[1]] if world.buildings else []
+    if (highest_m := max(roofs_m, default=0.0)) > altitude_m:
+        yield (
+            f"nodes.altitude_m = {altitude_m:g}: below the roofs of buildings, up to {highest_m:g} m high, which cut "
+            'links (radio.channel = "range") without a warning: stated bounds may not hold, and such a run is not valid'
+        )
+
+
+def _empty_batteries(scenario: Scenario) -> Iterator[str]:
+    most, reserve = scenario.world.charge[1], scenario.mission.reserve_charge
+    if scenario.mission.search != "none" and scenario.sensors.battery_hz and most <= reserve:
+        yield (
+            f"world.charge: at most {most:g}, not more than mission.reserve_charge = {reserve:g}, with which UAVs must "
+            "come home: nobody searches"
         )
 
 

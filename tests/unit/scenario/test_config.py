@@ -112,6 +112,8 @@ def test_the_sizes_of_messages_that_a_scenario_is_checked_with_are_those_of_the_
 def test_a_search_by_uavs_that_do_not_fly_is_refused() -> None:
     with pytest.raises(ConfigError, match=r"mission.search = .* needs mobility.speed_m_s > 0"):
         catalog.find("rescue", ["mobility.speed_m_s=0"])
+    with pytest.raises(ConfigError, match=r"mission.search = .* needs nodes.altitude_m > 0"):
+        catalog.find("rescue", ["nodes.altitude_m=0"])
 
 
 def test_a_search_above_its_ceiling_is_refused() -> None:

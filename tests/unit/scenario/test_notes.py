@@ -95,6 +95,24 @@ def test_heights_that_a_ceiling_has_no_room_for_are_noted(changes: list[str], sa
     assert [any(part in note for part in said) for note in found] == [True] * len(said)
 
 
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        (["world.buildings=9", "world.building_height_m=[20, 66]"], ["roofs of buildings, up to 66 m high"]),
+        (["world.buildings=9", "world.building_height_m=[20, 65]"], []),
+        (["world.buildings=[[0, 300, 9, 9, 80]]"], ["roofs of buildings, up to 80 m high"]),
+        (["world.buildings=[[0, 300, 9, 9, 80]]", "radio.obstruction_loss_db=0"], []),
+        (["world.buildings=[[0, 300, 9, 9, 80]]", "radio.channel=air_to_air"], []),
+        (["world.charge=[0.1, 0.15]", "sensors.battery_hz=1"], ["at most 0.15, not more than mission.reserve_charge"]),
+        (["world.charge=[0.1, 0.2]", "sensors.battery_hz=1"], []),
+        (["world.charge=[0.1, 0.1]"], []),
+    ],
+)
+def test_what_a_search_cannot_cope_with_is_noted(changes: list[str], said: list[str]) -> None:
+    found = notes(catalog.find("rescue", changes))
+    assert [any(part in note for part in said) for note in found] == [True] * len(said)
+
+
 def test_an_order_after_the_end_is_noted() -> None:
     orders = 'orders=[{order="end", at_s=70}, {order="end", at_s=9}]'
     found = notes(catalog.find("rescue", ["duration_s=40", "ground.at_m=[0, 0]", orders]))

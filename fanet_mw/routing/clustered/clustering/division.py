@@ -17,6 +17,8 @@ from fanet_mw.scenario.tables.clusters import METHODS
 from fanet_mw.units import NodeId
 
 _WORSE: Final = 1.25
+_LOYAL: Final = 1
+"""A node whose cluster has come apart stays in it if the nearest head is at most so many hops nearer."""
 
 
 class Division:
@@ -67,24 +69,36 @@ def _distance(head: NodeId, members: Sequence[NodeId], adjacency: Adjacency) -> 
 
 
 def carried_on(present: Sequence[Cluster], swarm: Swarm, stand_ins: Mapping[NodeId, NodeId]) -> list[Cluster]:
-    """The present clusters, without the nodes that are gone or cut off from their head, and with those that are new."""
+    """The present clusters without the nodes that are gone, and with those that are new. A node cut off from its head
+    over the members of its cluster stays, unless another head is clearly nearer: in a formation it would fly there.
+    """
     here = swarm.adjacency
-    clusters = []
+    clusters, before = list[Cluster](), dict[NodeId, int]()
     for cluster in present:
         members = [node for node in cluster.members if node in here]
         if members:
+            before |= dict.fromkeys(members, len(clusters))
             stand_in = stand_ins.get(cluster.head, cluster.head)
             head = next((node for node in (cluster.head, stand_in) if node in members), None)
             head = head or min((_distance(node, members, here), node) for node in members)[1]
             clusters.append(Cluster(head, tuple(sorted(levels(among(members, here), head)))))
-    return _with_the_others(clusters, here) if clusters else []
+    return _with_the_others(clusters, here, before) if clusters else []
 
 
-def _with_the_others(clusters: list[Cluster], here: Adjacency) -> list[Cluster]:
-    """Each node that is in no cluster joins the one whose head is nearest over members, or over any nodes."""
+def _with_the_others(clusters: list[Cluster], here: Adjacency, before: Mapping[NodeId, int]) -> list[Cluster]:
+    """Each node that is in no cluster stays in the one that it was in (`before`), if its head is nearly the nearest
+    over any nodes, or joins the one whose head is nearest over members, or over any nodes.
+    """
     members = [set(cluster.members) for cluster in clusters]
     hops = [levels(among(cluster.members, here), cluster.head) for cluster in clusters]
     left = sorted(set(here).difference(*members))
+    everywhere = [levels(here, cluster.head) for cluster in clusters]
+    for node in [node for node in left if node in before]:
+        k, nearest = before[node], min(hops.get(node, len(here)) for hops in everywhere)
+        if node in everywhere[k] and everywhere[k][node] <= nearest + _LOYAL:
+            members[k].add(node)
+            hops[k][node] = everywhere[k][node]
+            left.remove(node)
     while left:
         over_members = [
             (min(hops[k][near] for near in here[node] if near in members[k]) + 1, len(members[k]), k, node)
@@ -95,7 +109,6 @@ def _with_the_others(clusters: list[Cluster], here: Adjacency) -> list[Cluster]:
         if over_members:
             far, _, k, node = min(over_members)
         else:
-            everywhere = [levels(here, cluster.head) for cluster in clusters]
             node = left[0]
             far, _, k = min((everywhere[k].get(node, len(here)), len(members[k]), k) for k in range(len(clusters)))
         members[k].add(node)

@@ -1,5 +1,6 @@
 """How the leader carries clusters on from one assignment to the next, and what joins tell it."""
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -44,6 +45,16 @@ def test_a_member_that_is_cut_off_from_its_head_goes_to_the_cluster_that_it_hear
     apart = LINE | {4: 950.0, 5: 1150.0, 6: 1350.0, 7: 1550.0, 2: 500.0, 3: 700.0}
     torn = [Cluster(NodeId(3), names(2, 3, 7)), Cluster(NodeId(5), names(4, 5, 6))]
     assert [cluster.members for cluster in carried_on(torn, swarm_of(apart), {})] == [names(2, 3), names(4, 5, 6, 7)]
+
+
+@pytest.mark.parametrize(("moves_m", "stays"), [(610.0, True), (810.0, False)])
+def test_who_hears_its_head_over_others_only_stays_unless_another_head_is_clearly_nearer(
+    moves_m: float, stays: bool
+) -> None:
+    """2 has flown over to the members of 5: its own head is two hops away from there, or three, and 5 one."""
+    torn = [Cluster(NodeId(3), names(2, 3)), Cluster(NodeId(5), names(4, 5, 6))]
+    places = {3: 200.0, 4: 400.0, 5: 600.0, 6: 800.0, 2: moves_m}
+    assert (2 in carried_on(torn, swarm_of(places), {})[0].members) == stays
 
 
 def test_clusters_that_share_the_load_badly_are_made_anew() -> None:

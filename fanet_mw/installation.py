@@ -23,6 +23,7 @@ _EXTRAS: Final = {
     "mcap_protobuf": "record",
     "foxglove_schemas_protobuf": "record",
     "google": "record",
+    "trimesh": "view",
     "viser": "view",
     "textual": "inspect",
 }

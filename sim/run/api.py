@@ -7,6 +7,7 @@ from pathlib import Path
 
 from agents.program.attached import Emulated
 from fanet_mw.scenario import Scenario
+from sim.results.outcome import Outcome
 from sim.results.result import Result
 from sim.run.arguments import OfUser, by_node, known_nodes, scenario_of
 from sim.run.launcher.leads import fitted
@@ -30,7 +31,7 @@ def simulate(
 class Launched:
     """A swarm of real processes that runs."""
 
-    def __init__(self, scenario: Scenario, swarm: SwarmRun) -> None:
+    def __init__(self, scenario: Scenario, swarm: SwarmRun, task: asyncio.Task[Outcome]) -> None:
         self.scenario = scenario
         """The scenario that is run."""
         self.processes = swarm.processes
@@ -39,12 +40,16 @@ class Launched:
         """The radio by which a node that was left out joins: `join(swarm.scenario, node=3, radio=swarm.radio)`."""
         self.result: Result | None = None
         """What came of the run, once the block is left; None before."""
-        self._swarm = swarm
+        self._swarm, self._task = swarm, task
+
+    async def wait(self) -> None:
+        """Wait until the run is over; leaving the block before makes its result partial."""
+        await asyncio.wait((self._task,))
 
     def stop(self) -> None:
         """End the run; before its time the result is partial."""
         if not self._swarm.time_is_over():
-            self._swarm.abort("ended by its program")
+            self._swarm.end("ended by its program")
 
 
 @contextlib.asynccontextmanager
@@ -61,7 +66,8 @@ async def launch(
 
     The nodes of `leave_out` are joined by others, who have the scenario as it is; without any, a scenario that states
     no `radio.lead_ms` gets one that fits the machine. The swarm's time begins when all are there. When the block ends
-    before the scenario's time, the run is ended; raises BusError when the swarm does not come up.
+    before the scenario's time (`await launched.wait()`), the run is ended; raises BusError when the swarm does not come
+    up, or the block ends before.
     """
     stated = scenario_of(scenario, seed=seed, overrides=overrides)
     known_nodes("leave_out", leave_out, stated)
@@ -79,7 +85,7 @@ async def launch(
         await asyncio.wait((started, task), return_when=asyncio.FIRST_COMPLETED)
         if task.done():
             task.result()
-        launched = Launched(known, started.result())
+        launched = Launched(known, started.result(), task)
         yield launched
         if not task.done():
             launched.stop()

@@ -42,6 +42,7 @@ count = 1
 [world]
 engine = "kinematic"
 """
+ONE = ("traffic.sources=1", "warmup_s=0.5", "drain_s=0.5")
 Got = set[tuple[int, int, str]]
 
 
@@ -97,6 +98,19 @@ def test_the_same_messages_arrive_in_virtual_time_over_zenoh_and_over_udp(tmp_pa
     expected = in_virtual_time(path)
     assert on_air(path, network) == expected
     assert asyncio.run(over_zenoh(path)) == expected
+
+
+async def test_a_program_that_waits_for_the_end_of_its_swarm_has_a_whole_result() -> None:
+    async with fanet_mw.launch("flooding", overrides=["duration_s=2", "nodes.count=2", *ONE]) as swarm:
+        await swarm.wait()
+    assert swarm.result is not None
+    assert swarm.result.summary["aborted"] is None
+
+
+async def test_a_program_that_leaves_before_its_swarm_is_up_is_told_why_there_is_no_result() -> None:
+    with pytest.raises(fanet_mw.BusError, match="before the swarm's time began: there is no result"):
+        async with fanet_mw.launch("flooding", overrides=["nodes.count=2", *ONE]):
+            pass
 
 
 @pytest.mark.slow

@@ -229,8 +229,12 @@ class SwarmRun:
 
     def interrupt(self, number: int) -> None:
         self._signal = number
+        self.end(f"interrupted by {signal.Signals(number).name}")
+
+    def end(self, why: str) -> None:
+        """End the run early because somebody wants it."""
         nothing = "" if self._clock else " before the swarm's time began: there is no result"
-        self.abort(f"interrupted by {signal.Signals(number).name}{nothing}")
+        self.abort(f"{why}{nothing}")
 
     def abort(self, why: str, *, broken: bool = False) -> None:
         """End the run early; what has been collected becomes a partial result. A `broken` swarm is stopped at once."""

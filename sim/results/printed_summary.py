@@ -197,7 +197,8 @@ def _mission_rows(mission: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         )
         yield (
             "search",
-            f"{mission['coverage']:.1%} of the area covered{images}, connected {mission['connected']:.1%} of the time",
+            f"{mission['coverage']:.1%} of the area covered{images}, connected by distance "
+            f"{mission['connected']:.1%} of the time",
         )
     times = mission["time_to_approach_s"]
     if times:

@@ -110,7 +110,7 @@ def test_all_that_there_is_to_tell_of_a_run() -> None:
         "post knows of 128 of 115, median 129.1 s after the confirmation, longest 130.1 s; connected with all "
         "13.1% of the time",
         "mistaken 132 taken for somebody else, 133 taken back",
-        "search 13.4% of the area covered by phones, 13.5% by cameras, connected 13.6% of the time",
+        "search 13.4% of the area covered by phones, 13.5% by cameras, connected by distance 13.6% of the time",
         "approach 4 UAVs, first after 137.1 s, half after 139.1 s",
         "localization median error 141 m",
         "collisions 142",

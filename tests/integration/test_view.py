@@ -291,7 +291,7 @@ class VirtualFeed:
 @pytest.mark.slow
 def test_a_uav_is_sent_to_the_mark_without_a_post_and_released_again() -> None:
     scenario = catalog.find("rescue", [
-        "nodes.count=6", "nodes.spacing_m=60", "world.area_m=700", "mission.survivors=0", "duration_s=46",
+        "nodes.count=6", "nodes.spacing_m=60", "world.area_m=700", "mission.survivors=0", "duration_s=50",
         "traffic.arrivals=none",
     ])  # fmt: skip
     state = SwarmState(scenario)
@@ -306,15 +306,15 @@ def test_a_uav_is_sent_to_the_mark_without_a_post_and_released_again() -> None:
 
     run(10)
     assert "sent to -120 m E, 90 m N" in actions.send(5, -120.0, 90.0)
-    run(32)
+    run(36)
     at = state.uavs[5].position
     assert math.hypot(at.east + 120, at.north - 90) < 15, "it is there, and stays although more than 10 s have passed"
     actions.release(5)
-    run(44)
+    run(48)
     at = state.uavs[5].position
     assert math.hypot(at.east + 120, at.north - 90) > 40, "it goes on with the search"
     actions.send(5, 5000.0, 0.0)
-    run(46)
+    run(50)
     assert any("does not do reposition: denied" in event.text for event in state.events if event.node == 5)
 
 

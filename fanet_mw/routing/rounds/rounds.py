@@ -17,7 +17,7 @@ from typing import ClassVar, Final, NamedTuple
 from fanet_mw.bus.messages import Reception, TxStatus
 from fanet_mw.errors import DropReason
 from fanet_mw.geodesy import Geodetic
-from fanet_mw.motion import Motion
+from fanet_mw.motion import Motion, falls
 from fanet_mw.node.contract import Port, RoutingProtocol
 from fanet_mw.node.duplicates import key_of, key_of_packet, origin_and_seq
 from fanet_mw.node.packet import Packet, is_used_up
@@ -500,7 +500,9 @@ class RoundFlooding(RoutingProtocol):
         return self._near
 
     def _stayers(self, now_ns: int) -> int:
-        """The neighbors with which this node has links that will last."""
+        """The neighbors with which this node has links that will last; none of them does for a UAV that falls."""
+        if falls(self._port.velocity):
+            return 0
         near = self._in_step.among(self._neighbors(now_ns))
         if self._lasting is None:
             return near

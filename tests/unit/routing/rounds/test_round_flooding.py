@@ -206,3 +206,15 @@ def test_who_sends_in_another_ones_turn_is_no_link_but_a_frame_that_somebody_rep
     sent = run(node, at_ns + S, from_ns=at_ns)
     told = [one for each in sent for packet in unbundle(each.frame) for one in decode_heard(packet) if one.node == OURS]
     assert bool(told[-1].heard >> (NEAR - 1) & 1) == counts
+
+
+@pytest.mark.parametrize(("sinks_m_s", "counts"), [(4.0, True), (15.0, False)])
+def test_who_falls_says_that_it_has_no_links_so_that_others_exclude_it_before_its_radio_ends(
+    make_node: MakeNode, sinks_m_s: float, *, counts: bool
+) -> None:
+    node = make_node()
+    hear(node, 1, src=NEAR, at_ns=5 * S, kind=Kind.ROUND, priority=PRIORITY_CONTROL)
+    node.moved(Enu(0.0, 0.0, 50.0), Enu(0.0, 0.0, -sinks_m_s))
+    sent = run(node, 6 * S, from_ns=5 * S)
+    told = [one for each in sent for packet in unbundle(each.frame) for one in decode_heard(packet) if one.node == OURS]
+    assert bool(told and told[-1].heard >> (NEAR - 1) & 1) == counts

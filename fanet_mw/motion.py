@@ -6,14 +6,6 @@ from fanet_mw.units import Enu, S
 
 _new: Final = tuple.__new__  # faster than the constructor, for vectors that are computed all the time
 
-_FALLS_M_S: Final = 6.0
-"""Nobody sinks this fast on purpose."""
-
-
-def falls(velocity: Enu) -> bool:
-    """True for a UAV that falls from the sky."""
-    return velocity.up <= -_FALLS_M_S
-
 
 class Motion(NamedTuple):
     """A position, the velocity there [m/s], and the instant of both."""

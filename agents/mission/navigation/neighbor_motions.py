@@ -6,7 +6,7 @@ from typing import Final
 from agents.mission.navigation.known_obstacles import KnownObstacles
 from agents.mission.navigation.own_motion import OwnMotion
 from fanet_mw.bus.messages import Echo
-from fanet_mw.motion import Motion, falls
+from fanet_mw.motion import Motion
 from fanet_mw.node.neighbors import neighbor_lifetime_ns
 from fanet_mw.units import Enu, seconds_to_ns
 
@@ -24,6 +24,13 @@ tells where it may be.
 """
 _PLACE_BUT_M: Final = 10.0
 """A lost UAV that was out of reach hovers at most this far from its place in the formation."""
+_FALLS_M_S: Final = 6.0
+"""Nobody sinks this fast on purpose."""
+
+
+def falls(velocity: Enu) -> bool:
+    """True for a UAV that falls from the sky."""
+    return velocity.up <= -_FALLS_M_S
 
 
 class NeighborMotions:

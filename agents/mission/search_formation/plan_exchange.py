@@ -3,13 +3,14 @@
 from collections.abc import Callable
 from typing import Final
 
+from agents.mission.navigation.neighbor_motions import falls
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox, OutgoingPacket
 from agents.mission.search_formation.formation_place import FormationPlace
 from agents.mission.search_formation.formation_planner import STATUS_S, FormationPlanner
 from agents.mission.search_formation.pattern import Pattern
 from agents.mission.search_formation.roll_call import RollCall
-from fanet_mw.motion import Motion, falls
+from fanet_mw.motion import Motion
 from fanet_mw.trace import Planned
 from fanet_mw.units import MS, US, NodeId, S
 from fanet_mw.wire.search_messages import Roll

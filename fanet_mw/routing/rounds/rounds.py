@@ -17,7 +17,7 @@ from typing import ClassVar, Final, NamedTuple
 from fanet_mw.bus.messages import Reception, TxStatus
 from fanet_mw.errors import DropReason
 from fanet_mw.geodesy import Geodetic
-from fanet_mw.motion import Motion, falls
+from fanet_mw.motion import Motion
 from fanet_mw.node.contract import Port, RoutingProtocol
 from fanet_mw.node.duplicates import key_of, key_of_packet, origin_and_seq
 from fanet_mw.node.packet import Packet, is_used_up
@@ -68,6 +68,8 @@ _OTHERS_LATER: Final = 1.75
 """Bulk may reach some other node so many times later than this one, which may lie better."""
 _SPREAD_SLOTS: Final = 1.0
 """Neighbors that pass on the same warning start within so many slots."""
+_FALLS_M_S: Final = 12.0
+"""A UAV that sinks this fast falls: those that dive to evade others reach 11."""
 _BEFORE_TURN_NS: Final = 1 * US
 """A hello is made just before the turn in which it goes is filled."""
 
@@ -501,7 +503,7 @@ class RoundFlooding(RoutingProtocol):
 
     def _stayers(self, now_ns: int) -> int:
         """The neighbors with which this node has links that will last; none of them does for a UAV that falls."""
-        if falls(self._port.velocity):
+        if self._port.velocity.up <= -_FALLS_M_S:
             return 0
         near = self._in_step.among(self._neighbors(now_ns))
         if self._lasting is None:

@@ -208,7 +208,7 @@ def test_who_sends_in_another_ones_turn_is_no_link_but_a_frame_that_somebody_rep
     assert bool(told[-1].heard >> (NEAR - 1) & 1) == counts
 
 
-@pytest.mark.parametrize(("sinks_m_s", "counts"), [(4.0, True), (15.0, False)])
+@pytest.mark.parametrize(("sinks_m_s", "counts"), [(11.0, True), (15.0, False)])
 def test_who_falls_says_that_it_has_no_links_so_that_others_exclude_it_before_its_radio_ends(
     make_node: MakeNode, sinks_m_s: float, *, counts: bool
 ) -> None:

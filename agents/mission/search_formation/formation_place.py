@@ -31,8 +31,8 @@ _LEASH_M: Final = 58.0
 _LAG_M: Final = 140.0
 """The greatest distance by which a UAV of a team, or a relay, may be behind its place."""
 _NEARLY_M: Final = 120.0
-"""A UAV goes on to the survivor to whom it was sent once the estimate, unless it is vague, is this near."""
-_ENDS_M: Final = 200.0
+"""A UAV goes to a survivor, or goes on, while the estimate is this near, unless it is vague."""
+_ENDS_M: Final = 300.0
 """It does so while it is at most this far from its own place: its row waits for it, or closes ranks without it."""
 
 

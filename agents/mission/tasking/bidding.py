@@ -242,6 +242,7 @@ class Bidding:
         place = None if survivor in self._located else known.place()
         if place is not None and not place.is_vague:
             self._located.add(survivor)
+            self._taken_back_ns.pop(survivor, None)  # it sought a vague place in vain
             east_m, north_m = round(place.east_m, 2), round(place.north_m, 2)
             self._outbox.records.append(Located(now_ns, self._node, survivor, east_m, north_m))
 
@@ -289,6 +290,8 @@ class Bidding:
         if self._may_look(place, lane, moves):
             ahead_m, _ = along(moves, place.east_m - here.east, place.north_m - here.north)
             return max(eta_s, abs(ahead_m) / self._cruise_m_s) if moves.norm() else eta_s
+        if formation.finishes(place, now_ns):
+            return eta_s
         if leaves and formation.searches and ahead_m < -_PASSED_M and formation.can_be_spared(now_ns):
             return eta_s + _LEAVES_S
         return None

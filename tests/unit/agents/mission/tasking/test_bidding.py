@@ -98,6 +98,22 @@ def test_before_the_sweep_a_responder_that_is_held_back_soon_takes_its_bid_back(
         assert board.tasks.survivor == task, "75 m at 7.5 m/s, and 15 s"
 
 
+@pytest.mark.parametrize("is_placed", [True, False])
+def test_who_sought_a_vague_place_in_vain_bids_again_at_once_when_the_phone_is_placed(*, is_placed: bool) -> None:
+    first = lane_of(LINE, TAKEN_UP_NS)
+    board, survivor = Board(LINE, first), Enu(first.east, first.north + 40, 0)
+    board.hear(1, survivor, range(1, 2), now_ns=S)
+    board.tasks.bid(S)
+    board.tasks.choose(S)
+    board.tasks.choose(57 * S)
+    assert board.tasks.survivor is None, "it was held back, and has taken its bid back"
+    if is_placed:
+        board.hear(1, survivor, range(2, 6), now_ns=58 * S)
+    board.tasks.bid(58 * S)
+    board.tasks.choose(58 * S)
+    assert board.tasks.survivor == (1 if is_placed else None)
+
+
 def test_before_the_sweep_a_uav_goes_as_far_aside_of_its_way_as_it_is_back_in_time() -> None:
     first = lane_of(LINE, TAKEN_UP_NS)
     for left_s, bids in ((50, True), (26, False)):  # 20 s there, 22 s back, and 8 s to look
@@ -127,9 +143,9 @@ def test_a_responder_that_finds_nobody_takes_its_bid_back_and_does_not_bid_again
     assert board.approach.arrived_ns == {}, "what it came to was not the place"
 
 
-@pytest.mark.parametrize(("behind_m", "stays_s"), [(125, 1), (60, 25)])
+@pytest.mark.parametrize(("behind_m", "stays_s"), [(125, 1), (60, 38)])
 def test_a_responder_whose_lane_leaves_a_survivor_behind_takes_its_bid_back(behind_m: float, stays_s: int) -> None:
-    """A line of 7.5 m/s keeps its UAVs within 140 m, and who is within 120 m of somebody within 200 m."""
+    """A line of 7.5 m/s keeps its UAVs within 140 m, and who is within 120 m of somebody within 300 m."""
     at = lane_of(LINE, NOW_NS)
     board = Board(LINE, at)
     board.hear(1, Enu(at.east, at.north - behind_m, 0), range(1, 5), now_ns=NOW_NS)
@@ -139,7 +155,21 @@ def test_a_responder_whose_lane_leaves_a_survivor_behind_takes_its_bid_back(behi
     for after_s, task in ((0, 1), (stays_s, 1), (stays_s + 3, None)):
         board.tasks.choose(NOW_NS + after_s * S)
         assert board.tasks.survivor == task
-    assert [bid.eta_ds for bid in board.tasks.bids_to_tell(now_ns=NOW_NS + 22 * S)] == [0xFFFF]
+    assert [bid.eta_ds for bid in board.tasks.bids_to_tell(now_ns=NOW_NS + 41 * S)] == [0xFFFF]
+
+
+@pytest.mark.parametrize(("aside_m", "near_m", "goes"), [(250, 60, True), (250, 150, False), (340, 60, False)])
+def test_who_passes_near_somebody_on_its_way_to_its_lane_goes_there(
+    aside_m: float, near_m: float, *, goes: bool
+) -> None:
+    at = lane_of(LINE, NOW_NS)
+    here = Enu(at.east + aside_m, at.north, UP_M)
+    board = Board(LINE, here)
+    board.hear(1, Enu(here.east, here.north - near_m, 0), range(1, 5), now_ns=NOW_NS)
+    board.tasks.bid(NOW_NS)
+    board.tasks.choose(NOW_NS)
+    assert (board.tasks.survivor == 1) == goes
+    assert (board.goal.at(board.tasks.survivor, NOW_NS)[0].minus(here).north < -near_m / 2) == goes
 
 
 def test_a_uav_of_a_line_looks_for_who_is_vaguely_placed_ahead_and_not_for_who_is_so_behind() -> None:

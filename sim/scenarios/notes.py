@@ -8,11 +8,12 @@ from collections.abc import Iterator
 from typing import Final, get_args
 
 from fanet_mw.errors import ConfigError
+from fanet_mw.graph.topology import within_range
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.tables.routing import PROTOCOLS
 from fanet_mw.scenario.tables.sections import Section, meanings
 from fanet_mw.scenario.tables.world import FASTEST_AIR_M_S
-from fanet_mw.units import S
+from fanet_mw.units import NodeId, S
 from fanet_mw.wire.search_plan import MOST_PLACES
 
 _NAMED: Final = 3
@@ -34,7 +35,7 @@ _SIGMAS: Final = 2.0
 def notes(scenario: Scenario) -> list[str]:
     kinds = (
         _after_the_end, _without_effect, _without_place, _still_waves, _beyond_the_vehicle, _close_pads, _low_ceiling,
-        _high_roofs, _empty_batteries, _odd_band, _guessed,
+        _high_roofs, _empty_batteries, _out_of_reach, _odd_band, _guessed,
     )  # fmt: skip
     return [note for kind in kinds for note in kind(scenario)]
 
@@ -130,6 +131,21 @@ def _beyond_the_vehicle(scenario: Scenario) -> Iterator[str]:
             f"mobility.speed_m_s = {asked_m_s:g}: world.vehicle = {world.vehicle} flies at most "
             f"{most_m_s:g} m/s through the air, and needs {airspeed_m_s:g}{against}"
         )
+
+
+def _out_of_reach(scenario: Scenario) -> Iterator[str]:
+    """Nodes that hear nobody where they rest, or all of them where they start."""
+    radio, count = scenario.radio, scenario.node_count
+    if radio.channel != "range" or count < 2:
+        return
+    from sim.world.mobility.layout import positions
+
+    places = {NodeId(node): at for node, at in enumerate(positions(scenario), 1)}
+    alone = [
+        node for node, near in within_range(places, range_m=radio.range_m, reaches=scenario.reaches).items() if not near
+    ]
+    if alone and (len(alone) == count or scenario.mobility.model == "static"):
+        yield f"radio.range_m = {radio.range_m:g}: {len(alone)} of {count} nodes hear nobody where they start"
 
 
 def _odd_band(scenario: Scenario) -> Iterator[str]:

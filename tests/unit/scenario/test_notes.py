@@ -41,6 +41,11 @@ CUTS = [{"kind": "cut", "node": 1, "at_s": 5}, {"kind": "cut", "node": 1, "at_s"
             {"faults": [{"kind": "cut", "node": 1, "at_s": 5}, {"kind": "cut", "node": 1, "at_s": 4}]},
             ["faults.0.at_s = 5"],
         ),
+        (
+            {"radio": {"channel": "range", "range_m": 90}, "nodes": {"count": 3, "layout": "line", "spacing_m": 100}},
+            ["radio.range_m = 90: 3 of 3 nodes hear nobody where they start"],
+        ),
+        ({"radio": {"channel": "range", "range_m": 100}, "nodes": {"count": 3, "layout": "line", "spacing_m": 90}}, []),
         ({"clock": {"jumps": [[1, 4.9, 1], [2, 50, 300]]}}, ["clock.jumps.1.1 = 50"]),
         ({"traffic": {"start_s": 4}}, ["traffic: start_s = 4, after the last packet, duration_s - drain_s = 4"]),
         (

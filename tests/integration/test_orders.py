@@ -38,7 +38,7 @@ def track(records: Sequence[Record], node: int) -> dict[int, Posed]:
 def test_all_fly_home_and_land_when_they_are_recalled(
     make_scenario: Callable[..., Scenario], order: str, mode: str
 ) -> None:
-    records = flown(make_scenario, {"at_s": AT_S, "order": order}, duration_s=80)
+    records = flown(make_scenario, {"at_s": AT_S, "order": order}, duration_s=90)
     for node in range(1, POST):
         of_node = dict(modes(records, node))
         assert of_node[mode] == pytest.approx(AT_S, abs=2.0)
@@ -95,7 +95,7 @@ def test_one_searches_around_a_place_up_to_the_radius(make_scenario: Callable[..
 def test_all_keep_out_of_an_area_that_is_closed_while_they_fly(
     make_scenario: Callable[..., Scenario], one_stays: Sequence[Record]
 ) -> None:
-    closed_m = (60.0, 20.0)
+    closed_m = (30.0, -70.0)
 
     def inside(records: Sequence[Record]) -> set[int]:
         late = [r for r in records if isinstance(r, Posed) and r.t_ns > 45 * S]

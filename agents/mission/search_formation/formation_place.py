@@ -32,8 +32,11 @@ _LAG_M: Final = 140.0
 """The greatest distance by which a UAV of a team, or a relay, may be behind its place."""
 _NEARLY_M: Final = 120.0
 """A UAV goes to a survivor, or goes on, while the estimate is this near, unless it is vague."""
-_ENDS_M: Final = 300.0
+_ENDS_M: Final = 200.0
 """It does so while it is at most this far from its own place: its row waits for it, or closes ranks without it."""
+_COMES_M: Final = 300.0
+_SETTLED_NS: Final = 20 * S
+"""So long after the sweep has begun it may be as far as `_COMES_M`: it is on its way to its place, or comes late."""
 
 
 _CLOSES_S: Final = 15.0
@@ -225,7 +228,8 @@ class FormationPlace:
         here = self._own_motion.position
         if estimate is None or estimate.is_vague or not self.is_taken_up(now_ns):
             return False
-        return estimate.distance_m(here) <= _NEARLY_M and self.lane(now_ns)[0].horizontal_to(here) <= _ENDS_M
+        most_m = _ENDS_M if self.is_taken_up(now_ns - _SETTLED_NS) else _COMES_M
+        return estimate.distance_m(here) <= _NEARLY_M and self.lane(now_ns)[0].horizontal_to(here) <= most_m
 
     def is_near(self, now_ns: int) -> bool:
         """True if this UAV is as near to its place as the swarm needs it to stay connected."""

@@ -290,7 +290,7 @@ class Bidding:
         if self._may_look(place, lane, moves):
             ahead_m, _ = along(moves, place.east_m - here.east, place.north_m - here.north)
             return max(eta_s, abs(ahead_m) / self._cruise_m_s) if moves.norm() else eta_s
-        if formation.finishes(place, now_ns):
+        if not formation.is_near(now_ns) and formation.finishes(place, now_ns):  # passed on the way to its lane
             return eta_s
         if leaves and formation.searches and ahead_m < -_PASSED_M and formation.can_be_spared(now_ns):
             return eta_s + _LEAVES_S

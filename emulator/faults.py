@@ -1,9 +1,14 @@
 """The faults in force on the air, and the planned ones. They change only links and noise.
 
-A jammer is sensed as energy from `radio.energy_detection_dbm` upwards: -62 dBm with OFDM (802.11-2020, 17.3.10.6),
-while DSSS looks for signals only (16.3.8.5, mode 2). A link that would be audible is marked with the gravest of its
-faults, to which lost frames count. Frames in flight keep the power with which they started. Not modeled: jammers that
-move or react.
+    degraded   power x 10^(-loss_db / 10); below the sensitivity the link is gone; a share of what is received is lost
+    jammed     the noise at receivers inside is higher, or nothing is received there; a jammer is sensed as energy from
+               `radio.energy_detection_dbm` upwards: -62 dBm with OFDM (802.11-2020, 17.3.10.6), while DSSS looks for
+               signals only (16.3.8.5, mode 2)
+    cut        no power to or from the node; if it is only mute or deaf, in one direction
+    partition  no power between stations on different sides
+
+A link that would be audible is marked with the gravest of its faults, to which lost frames count. Frames in flight keep
+the power with which they started. Not modeled: jammers that move or react.
 """
 
 import heapq

@@ -1,13 +1,17 @@
 """One slot per period that sends whole frames in FIFO order: the service that it guarantees, and its guard time.
 
-    |<------------- P ------------->|             a frame of airtime C starts only if it also ends within the slot S;
-    |   S   |                       |   S   |     k = floor(S/C) frames fit
+|<------------- P ------------->|
+|   S   |                       |   S   |      a frame of airtime C starts only if it also ends within the slot
+ C C C x                                       k = floor(S/C) frames fit; the rest x of the slot stays empty
+
+The worst instant to arrive is just after the last start that fits, S - C into the slot. From there the n-th frame of
+a queue that never empties is completed within
 
     completion(n) = (P - S + C) + floor((n-1)/k) P + ((n-1) mod k + 1) C
 
-The worst instant to arrive is just after the last start that fits, S - C into the slot. Arriving earlier, with room for
-j frames, costs the first j only their airtime and postpones none; the largest airtime bounds a mix. Not modeled:
-contention within the slot, loss, clock error (subtract the guard time from S).
+Arriving earlier, with room for j frames, costs the first j only their airtime and postpones none. Frames shorter than
+C start no later than if all had airtime C, so the largest airtime bounds a mix. Not modeled: contention within the
+slot, loss, clock error (subtract the guard time from S).
 """
 
 from fractions import Fraction

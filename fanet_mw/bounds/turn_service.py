@@ -1,13 +1,29 @@
 """The service of a head that transmits one packet in each of its turns, at given places of a repeating superframe.
 
-    completion(n) = lead + max over i of start(i+n) - start(i) + airtime
-    done(n)       = max over turns i of start(i + n) - start(i) + flood(i + n)
+    |   t   t     t          |   t   t     t          |      the turns of this head; those of others are not shown
 
-A packet that is announced less than `lead_ns` before a turn misses it; the worst instant is just too late for turn i. A
-flood of a timetable lasts until all nodes have the packet. A busy period is longest if it begins just after a turn; the
-bound is the maximum of done(n) - (n - 1) k intervals over all n of one superframe, with k packets a turn (Davis, Burns,
-Bril, Lukkien: Controller Area Network (CAN) schedulability analysis: Refuted, revisited and revised, Real-Time Systems
-35, 2007). It holds while the swarm stays as it was, no frame is lost, and nothing of higher priority takes the room.
+A packet that is announced less than `lead_ns` before a turn misses it. The worst instant is just too late for turn i:
+then the n-th packet of a queue that never empties is completed at the end of the n-th turn after it:
+
+    completion(n) = lead + max over i of start(i+n) - start(i) + airtime
+
+Each turn can take one packet of any length, so no time is lost at the end of a turn, and no packet blocks another: an
+urgent packet takes the next turn for which it can be announced.
+
+Floods in a timetable (`done_ns`, `worst_ns`) begin in turns of their root, and last until all nodes have the packet. A
+busy period is a time in which packets wait for these turns. It is longest if it begins just after a turn, and it ends
+with a turn that carries fewer than k packets, the most that fit. Up to then the n-th turn carries those from number
+(n - 1) k + 1 on. The first of these has waited longest: it was generated at least (n - 1) k intervals after the
+beginning of the period, and all nodes have it
+
+    done(n) = max over turns i of start(i + n) - start(i) + flood(i + n)
+
+after that beginning. The bound is the maximum of done(n) - (n - 1) k intervals over all n of one superframe: after a
+whole superframe the difference repeats or has become smaller. This is the method of Davis, Burns, Bril, Lukkien:
+Controller Area Network (CAN) schedulability analysis: Refuted, revisited and revised, Real-Time Systems 35, 2007. It
+holds while the swarm stays as it was when the timetable was made, no frame is lost, and nothing of higher priority
+takes the room of these packets in the turns. `fanet_mw/routing/clustered/timetable/own_bound.py` adds the time before
+the turn and after the flood.
 """
 
 from collections.abc import Sequence

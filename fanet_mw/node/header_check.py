@@ -1,4 +1,12 @@
-"""Rejects routing headers that cannot be true, whichever node has sent them, before the first copy has any effect.
+"""Rejects routing headers that cannot be true, whichever node has sent them. Each first copy is checked before it has
+any effect.
+
+    origin, transmitter, destination    nodes that exist; the transmitter is the one that the radio names
+    origin                              not this node, unless it knows the packet as its own
+    hops                                0 only at the origin; hops made and hop limit are at most 255 together
+    kind                                nobody relays a hello
+    instant of generation               not in the future; unless most neighbors say so: then the own clock is behind
+    sequence number                     not greater than a node had time to reach since swarm instant 0
 
 A packet that is recorded and sent again is a copy (`duplicates.py`), or has outlived its lifetime; a hello is old after
 the lifetime of frames in the radio and one hello interval, and with time beacons after 150 ms

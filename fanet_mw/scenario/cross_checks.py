@@ -251,9 +251,11 @@ def _too_high_search(scenario: Scenario) -> Iterator[str]:
 
 
 def _motionless_search(scenario: Scenario) -> Iterator[str]:
-    if scenario.mission.search != "none" and not scenario.nodes.altitude_m:
+    if scenario.mission.search == "none":
+        return
+    if not scenario.nodes.altitude_m:
         yield f'mission.search = "{scenario.mission.search}" needs nodes.altitude_m > 0'
-    if scenario.mission.search != "none" and not scenario.mobility.speed_m_s:
+    if not scenario.mobility.speed_m_s:
         yield f'mission.search = "{scenario.mission.search}" needs mobility.speed_m_s > 0'
 
 

@@ -138,7 +138,7 @@ def _out_of_reach(scenario: Scenario) -> Iterator[str]:
     radio, count = scenario.radio, scenario.node_count
     if radio.channel != "range" or count < 2:
         return
-    from sim.world.mobility.layout import positions
+    from sim.world.environment.layout import positions
 
     places = {NodeId(node): at for node, at in enumerate(positions(scenario), 1)}
     alone = [

@@ -144,8 +144,8 @@ class Announcing:
         self._told.pop(survivor, None)
 
     def tell(self, task: int | None, now_ns: int, *, unattended: Iterable[int] = ()) -> None:
-        """Flood the verdicts that are due, and the estimate of the survivor to whom this UAV flies, or nobody
-        (`unattended`) if none that was told is nearly as good.
+        """Flood the verdicts that are due, and the estimate of the survivor to whom this UAV flies. The estimate of one
+        to whom nobody flies (`unattended`) is flooded if it is clearly better than what was told.
         """
         if self._meets_ns is not None and now_ns >= self._meets_ns:
             self._meets_ns = None

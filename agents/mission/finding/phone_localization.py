@@ -2,11 +2,18 @@
 
     RSSI_i = P + b - L0 - 10 n log10(d_i) + shadowing_i,   b ~ N(0, s_b^2),   shadowing_i ~ N(0, s^2)
 
-A histogram filter (Thrun, Burgard, Fox: Probabilistic Robotics, 2005, chapter 4). Shadowing at places near each other
-is nearly the same (Gudmundson, 1991), so each power is compared with what those received nearest to its place let
-expect (Vecchia, Journal of the Royal Statistical Society B 50(2), 1988): residuals are whitened, one after the other,
-and b is integrated out in closed form. A place without reception counts for less the more there are beside it
-(`_news`).
+    RSSI_i    power that a UAV receives at place i [dBm]; if it receives nothing there, RSSI_i < threshold
+    P, L0, n  assumed transmit power [dBm], path loss at 1 m [dB], path loss exponent
+    b         offset of this phone's power, by burial, antenna and battery [dB]
+    d_i       distance of the phone from place i [m]
+
+Shadowing at places near each other is nearly the same (Gudmundson, 1991), so each power is compared with what those
+received nearest to its place let expect (Vecchia, Journal of the Royal Statistical Society B 50(2), 1988): residuals
+are whitened, one after the other, and b is integrated out in closed form. The filter is a histogram filter (Thrun,
+Burgard, Fox: Probabilistic Robotics, 2005, chapter 4): both sides of a straight course stay probable until a power from
+elsewhere excludes one. A place without reception counts for less the more there are beside it (`_news`): taken as
+independent, the many in one shadow drive an estimate to the edge of the area. `calibration.py` estimates an offset
+common to all phones; a recognized owner's position replaces the estimate.
 """
 
 import math

@@ -11,7 +11,7 @@ from agents.mission.search_formation.lasting_links import LASTING
 from agents.mission.search_formation.pattern import Pattern
 from agents.mission.tasking.bidding import Bidding
 from fanet_mw.motion import Motion
-from fanet_mw.units import Enu, NodeId, S
+from fanet_mw.units import Enu, NodeId
 from fanet_mw.wire.search_plan import Search
 
 _TETHER: Final = 0.95
@@ -44,8 +44,6 @@ _KEPT_M_S: Final = 1e-6
 _EARLY_TIES: Final = 2
 """A UAV that hears nobody to whom it is tied, because it has no plan or those beside it come late, stays connected with
 so many of its nearest neighbors."""
-_SETTLED_NS: Final = 20 * S
-"""So long after the sweep has begun everybody is at its place: until then who comes late hangs by links that last."""
 _STRONG: Final = 0.75
 """A link is strong if it is now, and will be at the places, shorter than this share of the radio's reach."""
 
@@ -103,7 +101,7 @@ class ConnectivityMaintenance:
         """The limits that keep a UAV without a task near those who respond, before the sweep, and one that responds
         after others near those who are first: at the end of its links it would hold them back.
         """
-        if self._bidding.is_first(now_ns) or self._formation.is_taken_up(now_ns):
+        if self._formation.is_taken_up(now_ns) or self._bidding.is_first(now_ns):
             return []
         responding = self._bidding.responders(now_ns, first=self._bidding.survivor is not None)
         planes = [
@@ -128,7 +126,7 @@ class ConnectivityMaintenance:
         plan, pattern, place = self._formation.plan, self._formation.pattern, self._formation.place
         ties: dict[NodeId, Motion] = {}
         if plan is not None and pattern is not None and place is not None:
-            if not self._formation.is_taken_up(now_ns - _SETTLED_NS):
+            if not self._formation.is_settled(now_ns):  # who comes late hangs by links that last
                 ties = self._lasting(plan, pattern, place, now_ns)
             if self._formation.is_taken_up(now_ns):
                 places = self._tied_to(pattern, place, now_ns)

@@ -25,7 +25,7 @@ tells where it may be.
 _PLACE_BUT_M: Final = 10.0
 """A lost UAV that was out of reach hovers at most this far from its place in the formation."""
 _FALLS_M_S: Final = 6.0
-"""Nobody sinks this fast on purpose."""
+"""In a search nobody sinks this fast on purpose."""
 
 
 def falls(velocity: Enu) -> bool:

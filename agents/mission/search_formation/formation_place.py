@@ -35,8 +35,9 @@ _NEARLY_M: Final = 120.0
 _ENDS_M: Final = 200.0
 """It does so while it is at most this far from its own place: its row waits for it, or closes ranks without it."""
 _COMES_M: Final = 300.0
+"""The same until all have settled at their places: it may still be on its way to its own."""
 _SETTLED_NS: Final = 20 * S
-"""So long after the sweep has begun it may be as far as `_COMES_M`: it is on its way to its place, or comes late."""
+"""So long after the sweep has begun everybody is at its place."""
 
 
 _CLOSES_S: Final = 15.0
@@ -203,6 +204,10 @@ class FormationPlace:
         """True once all UAVs have had time to fly to their places: the sweep has begun."""
         return self.plan is not None and now_ns >= _taken_up_ns(self.plan)
 
+    def is_settled(self, now_ns: int) -> bool:
+        """True once those that came late are at their places, too."""
+        return self.is_taken_up(now_ns - _SETTLED_NS)
+
     def lane(self, now_ns: int) -> tuple[Enu, Enu]:
         """Where the plan has the UAV now, above ground, and that velocity; before the sweep on its way there."""
         plan, pattern, place = self.plan, self.pattern, self.place
@@ -228,7 +233,7 @@ class FormationPlace:
         here = self._own_motion.position
         if estimate is None or estimate.is_vague or not self.is_taken_up(now_ns):
             return False
-        most_m = _ENDS_M if self.is_taken_up(now_ns - _SETTLED_NS) else _COMES_M
+        most_m = _ENDS_M if self.is_settled(now_ns) else _COMES_M
         return estimate.distance_m(here) <= _NEARLY_M and self.lane(now_ns)[0].horizontal_to(here) <= most_m
 
     def is_near(self, now_ns: int) -> bool:

@@ -3,9 +3,12 @@
     hop = period + turn + lead + handover
     D   = ((h + margin) * hop + (1 + used) * ceil(B / room) * period / (1 - hellos)) / (1 - urgent)
 
-`used`, `urgent` and `hellos` (s, u and e there) are shares of turns: of packets not less urgent, of more urgent ones,
-and of hellos. What waits follows from what was heard, because all nodes hear the same packets and serve them at the
-same rate (a leaky bucket). Assumed: no frame is lost; else a likely delay is stated instead (`LikelyDelay`).
+`h` is the greatest distance that the node knows to another, `margin` is for a topology that changes meanwhile; `used`,
+`urgent` and `hellos` (s, u and e there) are shares of turns: of packets not less urgent, of more urgent ones, and of
+hellos. All urgent packets under way, `B` bytes, delay each other once: every node serves them at the same rate, `room`
+bytes of a frame per round (tandem of equal servers; Le Boudec and Thiran, Network Calculus, 1.4.3), the oldest first.
+What waits follows from what was heard, because all nodes hear the same packets and serve them at the same rate (a leaky
+bucket). Assumed: no frame is lost; over any channel but `range` a likely delay is stated instead (`LikelyDelay`).
 """
 
 from collections import defaultdict

@@ -92,7 +92,7 @@ def _with_the_others(clusters: list[Cluster], here: Adjacency, before: Mapping[N
     members = [set(cluster.members) for cluster in clusters]
     hops = [levels(among(cluster.members, here), cluster.head) for cluster in clusters]
     left = sorted(set(here).difference(*members))
-    everywhere = [levels(here, cluster.head) for cluster in clusters]
+    everywhere = [levels(here, cluster.head) for cluster in clusters] if left else []
     for node in [node for node in left if node in before]:
         k, nearest = before[node], min(hops.get(node, len(here)) for hops in everywhere)
         if node in everywhere[k] and everywhere[k][node] <= nearest + _LOYAL:

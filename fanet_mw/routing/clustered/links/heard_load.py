@@ -1,8 +1,14 @@
 """Estimates how many packets each node of the swarm sends, from the sequence numbers and birth times of those that one
-node receives: the mean rate between marks at least 1 s apart, plus twice its standard error.
+node receives.
 
-With too few marks it is the load that the scenario states. A packet born in the future, or that implies more than the
-greatest load, may be forged: it is counted only.
+Two received packets tell how many the origin has made between them, lost and dropped ones included. Some of each node,
+at least 1 s apart, are kept as marks:
+
+    enough marks                the mean rate between the marks, plus twice its standard error
+    nothing heard for long      at most the mean rate from the first mark until now, with one packet in the silence
+    too few marks               the load that the scenario states; the least load if none of its traffic is the node's
+
+A packet born in the future, or that implies more than the greatest load, may be forged: it is counted only.
 """
 
 import math

@@ -2,7 +2,14 @@
 
     joins -> none for a moment -> clusters -> schedule, announced once per flooding period
 
-An *epoch* is one assignment of nodes to clusters; when a new one begins: docs/explanation/roles.md.
+An *epoch* is one assignment of nodes to clusters. The leader begins a new one when
+
+    a node is new, or has gone                 at the next announcement; one that is reported silent may object first
+    a schedule is forged in the leader's name  at the next announcement
+    the links of most nodes are measured       at the next announcement, for the first time
+    the clusters or links have become too bad  `clusters.reassign_s` after the present epoch began, and once it is known
+                                               who has turned with the leader; never if `reassign_s` is 0
+    the load of nodes has changed              likewise, with `clusters.load = "heard"`; after `_RELOAD_NS` if that is 0
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,6 +1,5 @@
-"""Tells the program that started this process that it is ready: a byte into a pipe, whose number that program gave.
-
-A process that ends before closes the pipe without one.
+"""How a process tells the program that started it that it is ready: by a byte into a pipe, whose number that program
+gave in the environment. A process that ends before it is ready closes the pipe without a byte.
 """
 
 import contextlib
@@ -11,7 +10,7 @@ VARIABLE: Final = "FANET_READY_FD"
 
 
 def tell_ready() -> None:
-    """Does nothing where nobody waits for it, or when it was told before."""
+    """The first call writes the byte; where nobody waits for it nothing happens."""
     number = os.environ.pop(VARIABLE, None)
     if number is not None:
         with contextlib.suppress(OSError, ValueError):

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 _NICENESS: Final = 5
 _ONLY_LISTEN: Final = ("record", "view")
-"""These give way; a gateway and a world of flight controllers are waited for, as the emulator is."""
+"""These give way, because nobody depends on them; a swarm depends on its gateway and its flight controllers."""
 _CLOSING_S: Final = 20.0
 _TERMINATED: Final = (-signal.SIGTERM, 128 + signal.SIGTERM)
 
@@ -38,7 +38,7 @@ class Companions:
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._running: list[subprocess.Popen[bytes]] = []
         self._unready: dict[int, int] = {}
-        """Who has not said that it listens: the end of its pipe, by its index among the commands."""
+        """The reading end of the pipe of each that has not said yet that it listens, by the index of its command."""
         self.failed: dict[str, str] = {}
         """How each ended that did not end in good order, by its first word; known when all were ended."""
 
@@ -70,7 +70,7 @@ class Companions:
             os.close(tells)
 
     def awaited(self) -> list[str]:
-        """Those that do not listen yet, for which the swarm waits; raises HostError for one that has failed."""
+        """Those that do not listen yet, for which the swarm waits; raises HostError if one fails before that."""
         for index, pipe in [*self._unready.items()]:
             if not select.select([pipe], [], [], 0)[0]:
                 continue
@@ -112,12 +112,12 @@ class Companions:
 
 
 def _begin(*, gives_way: bool) -> None:
-    """In a group of its own, which Ctrl-C does not reach, but in the launcher's session: Linux shares processors among
-    sessions first, so that one of its own would take as much as a swarm, or starve beside busy ones, whatever its nice.
+    """A companion is in a group of its own, which Ctrl-C does not reach, but in the launcher's session: Linux may share
+    processors among sessions before it looks at niceness, and one of its own would take as much as a swarm, or starve.
     """
     if gives_way:
         os.nice(_NICENESS)
-    signal.signal(signal.SIGTTOU, signal.SIG_IGN)  # `stty tostop` would stop what it says
+    signal.signal(signal.SIGTTOU, signal.SIG_IGN)  # with `stty tostop` its first words would stop it
 
 
 def record_command(path: Path) -> list[str]:

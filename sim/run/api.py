@@ -43,7 +43,7 @@ class Launched:
         self._swarm, self._task = swarm, task
 
     async def wait(self) -> None:
-        """Wait until the run is over; leaving the block before makes its result partial."""
+        """Wait until the run is over; who leaves the block before gets a partial result."""
         await asyncio.wait((self._task,))
 
     def stop(self) -> None:
@@ -65,9 +65,9 @@ async def launch(
     """Run a scenario as real processes while the block lasts; afterwards `result` is what was collected.
 
     The nodes of `leave_out` are joined by others, who have the scenario as it is; without any, a scenario that states
-    no `radio.lead_ms` gets one that fits the machine. The swarm's time begins when all are there. When the block ends
-    before the scenario's time (`await launched.wait()`), the run is ended; raises BusError when the swarm does not come
-    up, or the block ends before.
+    no `radio.lead_ms` gets one that fits the machine. The swarm's time begins when all are there. A block that ends
+    early ends the run; `await launched.wait()` stays until the scenario's end. Raises BusError when the swarm does not
+    come up, or the block ends before that.
     """
     stated = scenario_of(scenario, seed=seed, overrides=overrides)
     known_nodes("leave_out", leave_out, stated)

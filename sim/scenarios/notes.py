@@ -134,7 +134,7 @@ def _beyond_the_vehicle(scenario: Scenario) -> Iterator[str]:
 
 
 def _out_of_reach(scenario: Scenario) -> Iterator[str]:
-    """Nodes that hear nobody where they rest, or all of them where they start."""
+    """Nodes that hear nobody at the start: any that rest, or all."""
     radio, count = scenario.radio, scenario.node_count
     if radio.channel != "range" or count < 2:
         return
@@ -178,7 +178,7 @@ def _close_pads(scenario: Scenario) -> Iterator[str]:
 
 
 def _low_ceiling(scenario: Scenario) -> Iterator[str]:
-    """A ceiling that leaves UAVs that cannot know of each other no heights of their own, or above which some return."""
+    """A ceiling too low for UAVs that cannot know of each other to have own heights, or for those that return."""
     mission, mobility, altitude_m = scenario.mission, scenario.mobility, scenario.nodes.altitude_m
     if mission.search == "none":
         return
@@ -201,7 +201,7 @@ def _low_ceiling(scenario: Scenario) -> Iterator[str]:
 
 
 def _high_roofs(scenario: Scenario) -> Iterator[str]:
-    """Buildings that cut links at once, which a protocol that states bounds by distances cannot foresee."""
+    """Buildings higher than UAVs fly: they cut links at once, which bounds by distances do not foresee."""
     world, radio, altitude_m = scenario.world, scenario.radio, scenario.nodes.altitude_m
     protocol = scenario.routing.protocol
     promises = protocol == "rounds" or (protocol in _CLUSTERED and scenario.clusters.relay == "scheduled")
@@ -213,7 +213,7 @@ def _high_roofs(scenario: Scenario) -> Iterator[str]:
         try:
             roofs_m = [footprint.height for footprint in town_of(world).boxes]
         except ConfigError:
-            return  # as in `_guessed`
+            return  # whoever builds the world says what is wrong with the file
     elif isinstance(world.buildings, tuple):
         roofs_m = [building[4] for building in world.buildings]
     else:

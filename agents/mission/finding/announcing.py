@@ -1,7 +1,8 @@
-"""What one UAV floods about survivors: estimates while it or nobody responds, and verdicts until all nodes know them.
+"""What one UAV floods about survivors: its verdicts, and its estimate of one to whom it flies, or nobody does.
 
-A verdict (confirmed, refuted, or a person without a phone) is flooded three times, then said in hellos for a while, and
-again when another UAV does not seem to know of it. Whoever hears a lost UAV again floods all verdicts of some time.
+Who makes a verdict (confirmed, refuted, inside a building, among people, or a person without a phone) floods it three
+times; hellos say it meanwhile. One in four of those who know it floods it again when another UAV does not seem to.
+Whoever hears a lost UAV again floods all verdicts that were not flooded just now.
 """
 
 from collections.abc import Iterable
@@ -144,8 +145,8 @@ class Announcing:
         self._told.pop(survivor, None)
 
     def tell(self, task: int | None, now_ns: int, *, unattended: Iterable[int] = ()) -> None:
-        """Flood the verdicts that are due, and the estimate of the survivor to whom this UAV flies. The estimate of one
-        to whom nobody flies (`unattended`) is flooded if it is clearly better than what was told.
+        """Flood the verdicts that are due, and the estimate of the survivor to whom this UAV flies. A UAV that has
+        received the phone of one to whom nobody flies (`unattended`) floods its estimate, too, if it is the best.
         """
         if self._meets_ns is not None and now_ns >= self._meets_ns:
             self._meets_ns = None
@@ -167,8 +168,8 @@ class Announcing:
                 self._tell_estimate(survivor, now_ns)
 
     def _places_best(self, survivor: int) -> bool:
-        """True for a UAV that has received the phone and places it clearly better than whoever has told: a UAV that
-        passes beside it may not know that it does.
+        """True if this UAV has received the phone, and its estimate is clearly better than the best that was told, or
+        the first: another UAV may pass the survivor unaware.
         """
         known = self._survivors.by_id[survivor]
         own = known.own_place()

@@ -98,8 +98,8 @@ class ConnectivityMaintenance:
         return planes + closer  # who cannot follow so close stays in reach
 
     def _led(self, ties: dict[NodeId, Motion], offsets: dict[NodeId, Enu], now_ns: int) -> list[HalfPlane]:
-        """The limits that keep a UAV without a task near those who respond, before the sweep, and one that responds
-        after others near those who are first: at the end of its links it would hold them back.
+        """The limits before the sweep that keep a UAV without a task near those who respond, and one that responds
+        after others near those who arrive first at some survivor: it would hold them back where their links end.
         """
         if self._formation.is_taken_up(now_ns) or self._bidding.is_first(now_ns):
             return []
@@ -126,7 +126,7 @@ class ConnectivityMaintenance:
         plan, pattern, place = self._formation.plan, self._formation.pattern, self._formation.place
         ties: dict[NodeId, Motion] = {}
         if plan is not None and pattern is not None and place is not None:
-            if not self._formation.is_settled(now_ns):  # who comes late hangs by links that last
+            if not self._formation.is_settled(now_ns):  # links that last hold those who come late
                 ties = self._lasting(plan, pattern, place, now_ns)
             if self._formation.is_taken_up(now_ns):
                 places = self._tied_to(pattern, place, now_ns)

@@ -31,13 +31,13 @@ _LEASH_M: Final = 58.0
 _LAG_M: Final = 140.0
 """The greatest distance by which a UAV of a team, or a relay, may be behind its place."""
 _NEARLY_M: Final = 120.0
-"""A UAV goes to a survivor, or goes on, while the estimate is this near, unless it is vague."""
+"""In the sweep a UAV may fly to a survivor whose estimate is this near to it and not vague."""
 _ENDS_M: Final = 200.0
 """It does so while it is at most this far from its own place: its row waits for it, or closes ranks without it."""
 _COMES_M: Final = 300.0
-"""The same until all have settled at their places: it may still be on its way to its own."""
+"""The same distance until all have settled: a UAV may still be on its way to its place."""
 _SETTLED_NS: Final = 20 * S
-"""So long after the sweep has begun everybody is at its place."""
+"""So long after the sweep has begun everybody is taken to be at its place."""
 
 
 _CLOSES_S: Final = 15.0
@@ -205,7 +205,7 @@ class FormationPlace:
         return self.plan is not None and now_ns >= _taken_up_ns(self.plan)
 
     def is_settled(self, now_ns: int) -> bool:
-        """True once those that came late are at their places, too."""
+        """True once those that came late have had time to reach their places, too."""
         return self.is_taken_up(now_ns - _SETTLED_NS)
 
     def lane(self, now_ns: int) -> tuple[Enu, Enu]:

@@ -1,5 +1,7 @@
-"""Decides for which survivors one UAV bids, and to which of those that it has won it flies: at first one responder, for
-another bearing a second one, and once enough UAVs have reported the survivor as many as the scenario wants. Who does
+"""Decides for which survivors one UAV bids, and to which of those that it has won it flies.
+
+A survivor gets one responder at first, another one after 4 s for another bearing (all where UAVs may leave), and all
+that the scenario wants once enough UAVs have reported it; before the sweep a vague place gets twice as many. Who does
 not get there, or does not find the survivor, withdraws its bid after a while.
 """
 
@@ -217,16 +219,16 @@ class Bidding:
         return not self._is_within_limits(self._survivors.by_id[self.survivor].place(), now_ns)
 
     def responders(self, now_ns: int, *, first: bool = False) -> set[int]:
-        """The UAVs that have won a task, as far as this one knows; `first`: those who arrive before all others."""
+        """The UAVs that have won a task, as far as this one knows; `first`: of each task the one that arrives first."""
         most = 1 if first else None
         return {node for survivor in self._survivors.sought() for node in self._winners(survivor, now_ns)[:most]}
 
     def unattended(self, now_ns: int) -> list[int]:
-        """The survivors to whom nobody flies."""
+        """The survivors for whom nobody has won the auction, as far as this UAV knows."""
         return [survivor for survivor in self._survivors.sought() if not self._winners(survivor, now_ns)]
 
     def is_first(self, now_ns: int) -> bool:
-        """True if no other UAV arrives at the survivor before this one does."""
+        """True if this UAV flies to a survivor, and no other one arrives there before it by what they have bid."""
         return self.survivor is not None and self._winners(self.survivor, now_ns)[:1] == [self._node]
 
     def _announce(self, survivor: int, now_ns: int) -> None:
@@ -242,7 +244,7 @@ class Bidding:
         place = None if survivor in self._located else known.place()
         if place is not None and not place.is_vague:
             self._located.add(survivor)
-            self._taken_back_ns.pop(survivor, None)  # it sought a vague place in vain
+            self._taken_back_ns.pop(survivor, None)  # this UAV withdrew while the place was vague
             east_m, north_m = round(place.east_m, 2), round(place.north_m, 2)
             self._outbox.records.append(Located(now_ns, self._node, survivor, east_m, north_m))
 
@@ -290,7 +292,7 @@ class Bidding:
         if self._may_look(place, lane, moves):
             ahead_m, _ = along(moves, place.east_m - here.east, place.north_m - here.north)
             return max(eta_s, abs(ahead_m) / self._cruise_m_s) if moves.norm() else eta_s
-        if not formation.is_near(now_ns) and formation.finishes(place, now_ns):  # passed on the way to its lane
+        if not formation.is_near(now_ns) and formation.finishes(place, now_ns):  # it passes him on the way to its lane
             return eta_s
         if leaves and formation.searches and ahead_m < -_PASSED_M and formation.can_be_spared(now_ns):
             return eta_s + _LEAVES_S

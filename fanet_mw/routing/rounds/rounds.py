@@ -69,7 +69,7 @@ _OTHERS_LATER: Final = 1.75
 _SPREAD_SLOTS: Final = 1.0
 """Neighbors that pass on the same warning start within so many slots."""
 _FALLS_M_S: Final = 12.0
-"""A UAV that sinks this fast falls: those that dive to evade others reach 11."""
+"""A UAV that sinks this fast is taken to fall: those that dive to evade others reach 11 m/s."""
 _BEFORE_TURN_NS: Final = 1 * US
 """A hello is made just before the turn in which it goes is filled."""
 
@@ -502,7 +502,9 @@ class RoundFlooding(RoutingProtocol):
         return self._near
 
     def _stayers(self, now_ns: int) -> int:
-        """The neighbors with which this node has links that will last; none of them does for a UAV that falls."""
+        """The neighbors with which this node has links that will last; none while it falls, so that bounds do not count
+        on it when its radio ends on the ground.
+        """
         if self._port.velocity.up <= -_FALLS_M_S:
             return 0
         near = self._in_step.among(self._neighbors(now_ns))

@@ -138,7 +138,7 @@ class SwarmRun:
         self._services = services
         self._leads = leads
         self._awaited = awaited
-        """Who else must be there before the clock starts, by name: the programs that listen to this swarm."""
+        """Names the programs beside the swarm that are not ready yet, for which the clock waits."""
         self._tell = tell
         self._collector = Collector(scenario, bus.subscribe, names, now_ns=time.monotonic_ns, folder=spool_folder)
         bus.answer(names.standing, self._collector.standing)
@@ -278,7 +278,7 @@ class SwarmRun:
         return ready_s
 
     async def _start_once_heard(self) -> ClockEpoch:
-        """Start the clock when those beside the swarm listen, who then miss nothing, and all processes are there."""
+        """Wait until all programs beside the swarm listen, who then miss nothing, then for all processes, and start."""
         until_s = time.monotonic() + READY_TIMEOUT_S
         while names := self._awaited():
             if time.monotonic() > until_s:
@@ -485,8 +485,8 @@ async def launch(
 
     `slow_down_to`: the scale to which the clock may slow down while the machine cannot keep up. Nodes of `leave_out`
     are joined by a program of the user's. Without `own_world` a foreign world declares the liveliness token of `world`.
-    `leads`: what was chosen for the scenario, for the outcome. `awaited`: those for whom the clock waits, beside the
-    swarm's own processes, as long as it names any. `zenoh_config`: a file for all processes, or a folder
+    `leads`: what was chosen for the scenario, for the outcome. `awaited` names programs that are not ready; the clock
+    waits until it names none. `zenoh_config`: a file for all processes, or a folder
     with one for each. Raises BusError when the swarm does not come up, ConfigError when the world is impossible or a
     limit too low, HostError when the program launches when it is imported, and KeyboardInterrupt for a signal before
     there is anything to report.

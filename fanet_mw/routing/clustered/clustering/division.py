@@ -69,8 +69,8 @@ def _distance(head: NodeId, members: Sequence[NodeId], adjacency: Adjacency) -> 
 
 
 def carried_on(present: Sequence[Cluster], swarm: Swarm, stand_ins: Mapping[NodeId, NodeId]) -> list[Cluster]:
-    """The present clusters without the nodes that are gone, and with those that are new. A node cut off from its head
-    over the members of its cluster stays, unless another head is clearly nearer: in a formation it would fly there.
+    """The present clusters without the nodes that are gone, and with those that are new. A node whose cluster has come
+    apart stays unless another head is clearly nearer: in a formation a UAV flies to the cluster that it joins.
     """
     here = swarm.adjacency
     clusters, before = list[Cluster](), dict[NodeId, int]()
@@ -86,8 +86,8 @@ def carried_on(present: Sequence[Cluster], swarm: Swarm, stand_ins: Mapping[Node
 
 
 def _with_the_others(clusters: list[Cluster], here: Adjacency, before: Mapping[NodeId, int]) -> list[Cluster]:
-    """Each node that is in no cluster stays in the one that it was in (`before`), if its head is nearly the nearest
-    over any nodes, or joins the one whose head is nearest over members, or over any nodes.
+    """Each node that is left returns to its former cluster (`before`) if no head is more than `_LOYAL` hops nearer over
+    any nodes; else it joins the one whose head is nearest over members, or over any nodes if it hears none.
     """
     members = [set(cluster.members) for cluster in clusters]
     hops = [levels(among(cluster.members, here), cluster.head) for cluster in clusters]

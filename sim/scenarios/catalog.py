@@ -1,7 +1,7 @@
 """Finds a scenario by name or path, reads and checks it."""
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -34,21 +34,48 @@ def _searchable(scenario: Scenario, source: str) -> Scenario:
     """
     scenario = with_engine(scenario)
     search = scenario.mission.search
+    if scenario.mission.formation != "none":
+        for problem in _beyond_the_fence(scenario):
+            raise ConfigError(f"{source}: {problem}")
     if search == "none":
         return scenario
-    from agents.mission.searcher import formation, least_nodes, unflyable
+    from agents.mission.searcher import demands_of, formation, least_nodes, unflyable
 
     for problem in unflyable(scenario):
         raise ConfigError(f"{source}: {problem}")
     count, area_m = scenario.nodes.count, scenario.world.area_m
     if formation(scenario, count) is None:
-        least = least_nodes(scenario)
+        least, demands, mission = least_nodes(scenario), demands_of(scenario), scenario.mission
+        limit = f"radio.range_m = {scenario.radio.range_m:g}"
+        if demands.phones_limit:
+            limit += (
+                f" and phones received within {demands.seen_m:.0f} m of a lane (mission.detection_dbm = "
+                f"{mission.detection_dbm:g}, phone_power_dbm = {mission.phone_power_dbm:g}, phone_exponent = "
+                f"{mission.phone_exponent:g}, rubble_db = {mission.rubble_db:g}, nodes.altitude_m = "
+                f"{scenario.nodes.altitude_m:g})"
+            )
         raise ConfigError(
             f"{source}: nodes.count = {count}: mission.search = {search!r} over world.area_m = {area_m:g} needs "
-            f"{f'more than {MOST_PLACES}' if least is None else f'at least {least}'} UAVs with radio.range_m = "
-            f"{scenario.radio.range_m:g}{f'; a plan names at most {MOST_PLACES}' if least is None else ''}"
+            f"{f'more than {MOST_PLACES}' if least is None else f'at least {least}'} UAVs with {limit}"
+            f"{f'; a plan names at most {MOST_PLACES}' if least is None else ''}"
         )
     return scenario
+
+
+def _beyond_the_fence(scenario: Scenario) -> Iterator[str]:
+    route_m = scenario.mission.route_m
+    if not route_m:
+        return
+    from sim.world.mobility.geofence import FENCE_M, fence_of
+
+    fence = fence_of(scenario)
+    for index, (east, north) in enumerate(route_m):
+        if abs(east) > fence.reach_m[0] or abs(north) > fence.reach_m[1]:
+            reach = ", ".join(f"+-{reach_m:g}" for reach_m in fence.reach_m)
+            yield (
+                f"mission.route_m.{index} = [{east:g}, {north:g}] must be within [{reach}], the geofence {FENCE_M:g} m "
+                f"around world.area_m = {scenario.world.area_m:g} and all starts: the leader would never get there"
+            )
 
 
 def text_of(name: str) -> str:

@@ -35,7 +35,7 @@ _SIGMAS: Final = 2.0
 def notes(scenario: Scenario) -> list[str]:
     kinds = (
         _after_the_end, _without_effect, _without_place, _still_waves, _beyond_the_vehicle, _close_pads, _low_ceiling,
-        _high_roofs, _empty_batteries, _out_of_reach, _odd_band, _guessed,
+        _high_roofs, _empty_batteries, _out_of_reach, _odd_band, _wide_formation, _keeping_clear_of_nobody, _guessed,
     )  # fmt: skip
     return [note for kind in kinds for note in kind(scenario)]
 
@@ -231,6 +231,35 @@ def _empty_batteries(scenario: Scenario) -> Iterator[str]:
         yield (
             f"world.charge: at most {most:g}, not more than mission.reserve_charge = {reserve:g}, with which UAVs must "
             "come home: nobody searches"
+        )
+
+
+def _wide_formation(scenario: Scenario) -> Iterator[str]:
+    """Waypoints of the leader at which others of the formation would be beyond the geofence."""
+    mission = scenario.mission
+    if mission.formation == "none" or not mission.route_m:
+        return
+    from agents.mission.formation_flight.flight_place import APART
+    from sim.world.mobility.geofence import fence_of
+
+    east_m, north_m = fence_of(scenario).reach_m
+    wide_m = mission.formation_m * (1 + APART if scenario.clusters.count > 1 else 1)
+    for index, (east, north) in enumerate(mission.route_m):
+        if abs(east) + wide_m > east_m or abs(north) + wide_m > north_m:
+            yield (
+                f"mission.route_m.{index} = [{east:g}, {north:g}]: places of the formation are up to {wide_m:g} m from "
+                f"the leader, some beyond the geofence at [+-{east_m:g}, +-{north_m:g}], where UAVs stop"
+            )
+
+
+def _keeping_clear_of_nobody(scenario: Scenario) -> Iterator[str]:
+    mission = scenario.mission
+    by_rule = (mission.search, mission.formation, scenario.mobility.model) == ("none", "none", "onboard")
+    if by_rule and mission.survivors and not mission.collision_horizon_s:
+        yield (
+            "mission.search = 'none': UAVs stay where they start until they fly to a survivor, all at one height, and "
+            "with mobility.model = 'onboard' they keep clear of each other by mission.collision_horizon_s alone, "
+            "which is 0"
         )
 
 

@@ -59,7 +59,7 @@ def _bearing(middle: Enu, place: Enu) -> float | None:
     return None if math.hypot(east, north) < _NO_BEARING_M else math.atan2(east, north)
 
 
-_APART: Final = 2.2
+APART: Final = 2.2
 """The distance of the other heads from the leader, as a multiple of the radius of the circle around a head. The circles
 of the clusters then do not touch, as long as no more than six other heads are spread evenly around the leader."""
 Clusters = Mapping[NodeId, tuple[NodeId, ...]]
@@ -100,7 +100,7 @@ class FlightPlace:
             return here, STILL if lead is None else lead.velocity
         if is_head:
             beside = self._places(set(clusters) - {head, self._node}, now_ns)
-            return self._around(followed, beside, _APART * self._radius_m, here, now_ns)
+            return self._around(followed, beside, APART * self._radius_m, here, now_ns)
         beside = self._places(set(self._followers(head, clusters, now_ns)) - {self._node}, now_ns)
         faces = self._places(set(clusters) - {head} if head == leader else {leader}, now_ns)
         return self._around(followed, beside, self._radius_m, here, now_ns, faces=faces)

@@ -68,8 +68,8 @@ class Mission(Section):
     formation_m: Annotated[float, Field(ge=20, le=10_000)] = 200.0
     """`formation`: the radius of the circle around a head; heads fly 2.2 times as far from the leader."""
     route_m: tuple[tuple[Coordinate, Coordinate], ...] = ()
-    """`formation`: east and north of the waypoints through which the leader flies at `mobility.speed_m_s`; empty: it
-    stays where it is."""
+    """`formation`: east and north of the waypoints through which the leader flies at `mobility.speed_m_s`, within the
+    geofence, 50 m outside the area; empty: it stays where it is."""
     reserve_charge: Annotated[float, Field(ge=0, le=1)] = 0.15
     """`search`: the share of its battery with which a UAV must come home. If it would come home with less, it flies
     home and lands, and others take over its place and task; needs `sensors.battery_hz`."""

@@ -9,8 +9,10 @@ from typing import Final
 
 import numpy as np
 
+from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu
 from sim.world.arrays import Flags, Rows
+from sim.world.environment.layout import positions
 
 FENCE_M: Final = 50.0
 """The distance of the geofence from the area; a UAV with a velocity setpoint brakes before it reaches the geofence."""
@@ -24,11 +26,26 @@ HOLD_M_S: Final = 5.0
 """The greatest speed at which a UAV that was moved away from the position it holds comes back to it."""
 
 
-class Geofence:
-    """The area of a swarm, which reaches so far to the east and the north of its middle, and the fence around it."""
+def fence_of(scenario: Scenario) -> "Geofence":
+    """The geofence that the world of a scenario will have."""
+    return Geofence(scenario, np.array(positions(scenario)[: scenario.nodes.count], np.float64))
 
-    def __init__(self, *, half_east_m: float, half_north_m: float) -> None:
-        self._half_east_m, self._half_north_m = half_east_m, half_north_m
+
+class Geofence:
+    """The area of a swarm, and the fence around it; UAVs that command themselves and start outside have theirs around
+    their starts.
+    """
+
+    def __init__(self, scenario: Scenario, starts: Rows) -> None:
+        half = np.full(2, scenario.world.area_m / 2)
+        if scenario.mobility.model == "onboard":
+            half = np.maximum(half, np.abs(starts[:, :2]).max(axis=0))
+        self._half_east_m, self._half_north_m = map(float, half)
+
+    @property
+    def reach_m(self) -> tuple[float, float]:
+        """How far to the east and north of the middle, and to the west and south, the geofence lies."""
+        return self._half_east_m + FENCE_M, self._half_north_m + FENCE_M
 
     def clipped(self, place: Enu) -> Enu:
         """The place in the area that is nearest to a place."""
@@ -40,8 +57,7 @@ class Geofence:
 
     def beyond(self, at: Rows) -> Flags:
         """True for each UAV that is beyond the geofence."""
-        reach = np.array([self._half_east_m, self._half_north_m]) + FENCE_M
-        return np.asarray((np.abs(at[:, :2]) > reach).any(axis=1))
+        return np.asarray((np.abs(at[:, :2]) > self.reach_m).any(axis=1))
 
     def brake(self, wish: Rows, at: Rows) -> Rows:
         """Velocities limited so that each UAV can brake before the geofence; a UAV beyond it is brought back."""

@@ -135,9 +135,7 @@ class Guidance:
         self._onboard = model == "onboard"
         """True if the UAVs are flown by their companion computers, which then avoid collisions themselves."""
         self._see_m = 0.0 if self._onboard else scenario.mobility.see_m
-        half = scenario.world.area_m / 2
-        reach = np.maximum(half, np.abs(starts[:, :2]).max(axis=0)) if self._onboard else (half, half)
-        self._fence = Geofence(half_east_m=float(reach[0]), half_north_m=float(reach[1]))
+        self._fence = Geofence(scenario, starts)
         self._returns = ReturnMode(starts, scenario, surface_m=self._surface_m)
         self._starts = starts.copy()
         """The place at which each UAV holds while neither a mobility model nor a setpoint moves it."""

@@ -132,6 +132,14 @@ def test_a_search_in_lines_by_too_few_uavs_is_refused_with_the_number_that_it_ne
         catalog.find("rescue", [f"nodes.count={least - 1}", f"traffic.sources={least - 2}"])
 
 
+def test_a_search_of_phones_that_are_hardly_received_is_refused_for_them_too() -> None:
+    phones = r"range_m = 250 and phones received within \d+ m of a lane \(mission\.detection_dbm = -73, "
+    with pytest.raises(ConfigError, match=phones):
+        catalog.find("rescue", ["mission.detection_dbm=-73"])
+    with pytest.raises(ConfigError, match=r"UAVs with radio\.range_m = 120$"):  # so lanes are near enough for phones
+        catalog.find("rescue", ["radio.range_m=120", "nodes.count=12", "traffic.sources=11"])
+
+
 def test_an_area_that_no_plan_can_name_enough_uavs_for_is_refused_and_a_spiral_searches_it_with_any() -> None:
     wide = ["nodes.count=45", "world.area_m=15000"]
     for search in ("lines", "sectors"):
@@ -151,6 +159,15 @@ def test_formation_flight_needs_clusters_and_uavs_that_fly_themselves() -> None:
     ):
         with pytest.raises(ConfigError, match=wanted):
             catalog.find("convoy", [override])
+
+
+def test_a_route_beyond_the_geofence_is_refused() -> None:
+    assert catalog.find("convoy", ["mission.route_m=[[0, -1550], [900, 700]]"]).mission.route_m[0] == (0, -1550)
+    beyond = r"mission\.route_m\.1 = \[0, -1551\] must be within \[\+-1550, \+-1550\], the geofence"
+    with pytest.raises(ConfigError, match=beyond):
+        catalog.find("convoy", ["mission.route_m=[[0, 700], [0, -1551]]"])
+    wide = ["nodes.spacing_m=1000", "radio.range_m=1500"]  # who starts beyond has the geofence behind it
+    assert catalog.find("convoy", ["mission.route_m=[[1551, 0]]", *wide]).nodes.spacing_m == 1000
 
 
 @pytest.mark.parametrize(

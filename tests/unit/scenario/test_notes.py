@@ -118,6 +118,25 @@ def test_what_a_search_cannot_cope_with_is_noted(changes: list[str], said: list[
     assert [any(part in note for part in said) for note in found] == [True] * len(said)
 
 
+def test_places_of_a_formation_beyond_the_geofence_are_noted() -> None:
+    assert notes(catalog.find("convoy")) == []
+    (said,) = notes(catalog.find("convoy", ["mission.route_m=[[0, 700], [920, 700]]"]))
+    assert said.startswith("mission.route_m.1 = [920, 700]: places of the formation are up to 640 m from the leader")
+    (alone,) = notes(catalog.find("convoy", ["mission.route_m=[[0, -1351]]", "clusters.count=1"]))
+    assert "up to 200 m from the leader" in alone
+
+
+def test_who_flies_by_the_papers_rule_alone_is_said_to_keep_clear_of_nobody() -> None:
+    alone = ["mission.search=none"]
+    (said,) = notes(catalog.find("rescue", alone))
+    assert said.startswith("mission.search = 'none': UAVs stay where they start until they fly to a survivor")
+    for changes in (
+        ["mission.collision_horizon_s=8", "mission.collision_distance_m=4"], ["mobility.model=random_waypoint"],
+        ["mission.survivors=0"],
+    ):  # fmt: skip
+        assert notes(catalog.find("rescue", [*alone, *changes])) == []
+
+
 def test_an_order_after_the_end_is_noted() -> None:
     orders = 'orders=[{order="end", at_s=70}, {order="end", at_s=9}]'
     found = notes(catalog.find("rescue", ["duration_s=40", "ground.at_m=[0, 0]", orders]))

@@ -121,6 +121,11 @@ class Demands(NamedTuple):
         return min(_WIDE * reach_m, _LANES * self.seen_m)
 
     @property
+    def phones_limit(self) -> bool:
+        """True if lanes lie nearer to each other for the phones than they would for the radio."""
+        return self.apart_m(self.reach_m) < self.hop_m
+
+    @property
     def hop_m(self) -> float:
         """The greatest distance of two neighboring relays."""
         return _WIDE * self.reach_m

@@ -63,7 +63,8 @@ class SwarmClock:
         self._machine = timebase.machine
         self._unix_less_mono_ns = timebase.unix_ns() - timebase.mono_ns()
         self._epoch_mono_ns = self._on_this_machine(clock)
-        self._scale = clock.time_scale
+        self.time_scale = clock.time_scale
+        """How many swarm seconds pass in a second of real time."""
         self._number = clock.number
         self._reached_ns = self._by_line_ns()
         """The clock does not go back behind this instant."""
@@ -81,13 +82,13 @@ class SwarmClock:
         if clock.number <= self._number:
             return False
         self._reached_ns = self.now_ns()
-        self._number, self._scale, self.ends_ns = clock.number, clock.time_scale, clock.ends_ns
+        self._number, self.time_scale, self.ends_ns = clock.number, clock.time_scale, clock.ends_ns
         self._epoch_mono_ns = self._on_this_machine(clock)
         return True
 
     def _by_line_ns(self) -> int:
         elapsed_ns = self._mono_ns() - self._epoch_mono_ns
-        return elapsed_ns if self._scale == 1 else round(elapsed_ns * self._scale)
+        return elapsed_ns if self.time_scale == 1 else round(elapsed_ns * self.time_scale)
 
     def now_ns(self) -> int:
         """The swarm instant now; it is negative before the start."""
@@ -96,7 +97,7 @@ class SwarmClock:
 
     def wait_s(self, instant_ns: int) -> float:
         """Seconds of real time until a swarm instant; negative when it has passed."""
-        return (instant_ns - self._by_line_ns()) / self._scale / S
+        return (instant_ns - self._by_line_ns()) / self.time_scale / S
 
 
 class ClockKeeper:

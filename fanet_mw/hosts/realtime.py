@@ -152,7 +152,7 @@ class RealtimeHost:
                 wait_s, began_s = min(left_s, _LOOK_EVERY_S), self._loop.time()
                 waited = (stopped, changed, self._failure)
                 await asyncio.wait(waited, timeout=wait_s, return_when=asyncio.FIRST_COMPLETED)
-                self._lateness.stalled(round((self._loop.time() - began_s - wait_s) * S))
+                self._lateness.stalled(round((self._loop.time() - began_s - wait_s) * clock.time_scale * S))
                 if self._failure.done():
                     break
                 if stopped.done():

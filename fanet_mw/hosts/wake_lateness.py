@@ -1,4 +1,6 @@
-"""How late a real-time host woke its actor, and for how long it stood still; both go into the actor's report."""
+"""How late a real-time host woke its actor, and for how long it stood still, in swarm time: both go into the actor's
+report.
+"""
 
 import math
 import resource
@@ -62,7 +64,7 @@ class WakeLateness:
         self.stalled(late_ns)
 
     def stalled(self, for_ns: int) -> None:
-        """The event loop did nothing for this long although it should have."""
+        """The event loop did nothing for this long, in swarm time, although it should have."""
         self._stall_ns = max(self._stall_ns, for_ns)
 
     def summary(self) -> Mapping[str, object]:

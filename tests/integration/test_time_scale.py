@@ -50,6 +50,19 @@ async def test_a_lead_is_swarm_time_so_that_a_slow_clock_gives_slow_processes_mo
         assert found["late_frames"] == 0
 
 
+@pytest.mark.parametrize("time_scale", [0.25, 2.0])
+async def test_a_standstill_is_as_long_as_the_swarm_time_that_it_costs(time_scale: float) -> None:
+    reports: list[bytes] = []
+    async with emulator("frozen", reports, time_scale=time_scale):
+        await asyncio.sleep(0.1)
+        time.sleep(1.2)  # noqa: ASYNC251: the emulator lives in this process, and stands still as well
+        await asyncio.sleep(0.1)
+    (last,) = codecs.decode(reports[-1])
+    assert isinstance(last, Report)
+    stall_ms = json.loads(last.json)["host"]["stall_ms"]
+    assert 600 * time_scale < stall_ms < 1200 * time_scale + 500
+
+
 @pytest.mark.parametrize("time_scale", [pytest.param(0.5, marks=pytest.mark.slow), 2.0])
 async def test_a_swarm_of_processes_lives_by_its_clock(tmp_path: Path, time_scale: float) -> None:
     changes = [

@@ -1,6 +1,7 @@
 """Connectivity maintenance: half-planes of velocities that keep a UAV within radio reach of those it is tied to."""
 
 import math
+from collections.abc import Collection
 from typing import Final
 
 from agents.mission.navigation.half_planes import HalfPlane, Velocity
@@ -134,9 +135,25 @@ class ConnectivityMaintenance:
                     NodeId(plan.nodes[at]): self._neighbors.motion(plan.nodes[at], now_ns=now_ns) for at in places
                 }
                 ties |= {node: motion for node, motion in motions.items() if motion is not None}
+                if not self._formation.is_settled(now_ns):
+                    ties |= self._towards([node for node, motion in motions.items() if motion is None], now_ns)
                 if not places and pattern.kind(place) != "follower":
                     return ties  # as in a circuit, where nobody keeps in reach of others
         return (ties or self._nearest_motions(now_ns)) | self._across(now_ns)
+
+    def _towards(self, late: Collection[NodeId], now_ns: int) -> dict[NodeId, Motion]:
+        """The neighbor nearest to each UAV beside which this one has its place and which it does not hear yet: a row
+        that did not stay with it would fly away alone.
+        """
+        present, here, found = self._present(now_ns), self._own_motion.position, dict[NodeId, Motion]()
+        for node in late:
+            at = self._formation.last_seen(node)
+            if at is not None:
+                near = [(motion.position_at(now_ns).horizontal_to(at), other) for other, motion in present.items()]
+                left_m, nearest = min(near, default=(math.inf, node))
+                if left_m < here.horizontal_to(at):
+                    found[nearest] = present[nearest]
+        return found
 
     def _across(self, now_ns: int) -> dict[NodeId, Motion]:
         """The nearest neighbor in another part of the swarm: the only link to it that this UAV has, and would lose."""

@@ -167,6 +167,10 @@ class FormationPlace:
         if at_ns >= self._seen.get(node, (position, at_ns))[1]:
             self._seen[node] = position, at_ns
 
+    def last_seen(self, node: int) -> Enu | None:
+        """Where another UAV was by the latest that it said of itself; None if nothing came from it."""
+        return self._seen[node][0] if node in self._seen else None
+
     def parted_ways(self, now_ns: int) -> dict[int, Motion]:
         """The places of the UAVs of another part before the sweep, and where these are likely to be on their way."""
         plan, pattern, ways = self.plan, self.pattern, dict[int, Motion]()

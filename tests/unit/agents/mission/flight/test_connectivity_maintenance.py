@@ -68,6 +68,28 @@ def test_until_all_are_at_their_places_a_uav_keeps_every_link_that_lasts(now_ns:
     assert ties == ([-1.0, 1.0] if tied_to_follower else [1.0])
 
 
+@pytest.mark.parametrize(
+    ("swept_s", "said_to_be_m", "stays"),
+    [(10, 300.0, True), (10, None, False), (10, 90.0, False), (30, 300.0, False)],
+    ids=["late", "never heard of", "nearer to this UAV than to the other one", "all have settled"],
+)
+def test_who_does_not_hear_one_beside_it_that_comes_late_stays_with_the_neighbor_nearest_to_that(
+    swept_s: int, said_to_be_m: float | None, *, stays: bool
+) -> None:
+    """A row that flew away without it came apart from the others (hills, seed 5, 71 s)."""
+    now_ns = TAKEN_UP_NS + swept_s * S
+    here = lane_of(LINE, now_ns)
+    board = Board(LINE, here)
+    board.neighbors.on_hello(LINE - 1, Motion(here.minus(Enu(150.0, 0, 0)), STILL, now_ns))
+    board.neighbors.on_hello(30, Motion(here.minus(Enu(0, 200.0, 0)), STILL, now_ns))  # of the other line
+    if said_to_be_m is not None:
+        board.place.see(LINE + 1, here.minus(Enu(0, said_to_be_m, 0)), now_ns)
+    tied = ConnectivityMaintenance(
+        board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M, speed_m_s=10.0
+    )
+    assert ((0.0, -1.0) in [(plane.east, plane.north) for plane in tied.planes(now_ns)]) is stays
+
+
 @pytest.mark.parametrize(("aside_m", "ties"), [(100.0, 1), (163.0, 2)])
 def test_on_the_way_a_uav_needs_no_tie_to_whom_a_third_one_has_strong_links(aside_m: float, ties: int) -> None:
     """The places of all three are near each other; two UAVs are 200 m apart, and the third 141 or 191 m from both."""

@@ -55,7 +55,7 @@ async def test_a_standstill_is_as_long_as_the_swarm_time_that_it_costs(time_scal
     reports: list[bytes] = []
     async with emulator("frozen", reports, time_scale=time_scale):
         await asyncio.sleep(0.1)
-        time.sleep(1.2)  # noqa: ASYNC251: the emulator lives in this process, and stands still as well
+        time.sleep(1.2)  # noqa: ASYNC251 - the emulator lives in this process, and stands still as well
         await asyncio.sleep(0.1)
     (last,) = codecs.decode(reports[-1])
     assert isinstance(last, Report)

@@ -33,6 +33,7 @@ from fanet_mw.bus.radio_control import (
     Mishap,
     Partition,
     Restore,
+    extent_of,
     kind_of,
     wrong,
 )
@@ -117,7 +118,7 @@ class Faults:
     def _note(self, fault: Fault, now_ns: int, *, active: bool) -> None:
         node = fault.node if isinstance(fault, Cut | Mishap) else fault.src if isinstance(fault, Degrade) else 0
         other = fault.dst if isinstance(fault, Degrade) else 0
-        self.records.append(RadioFault(now_ns, node, other, kind_of(fault), fault.label, active))
+        self.records.append(RadioFault(now_ns, node, other, kind_of(fault), fault.label, active, extent_of(fault)))
 
     # --- the effect on links and noise ----------------------------------------------------------------------------
 

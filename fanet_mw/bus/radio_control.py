@@ -11,6 +11,7 @@ from enum import IntEnum
 from typing import Final, NamedTuple, assert_never
 
 from fanet_mw.errors import ConfigError
+from fanet_mw.trace import LONGEST_EXTENT
 from fanet_mw.units import Enu, NodeId, S
 
 MAX_LABEL: Final = 32
@@ -126,6 +127,22 @@ def kind_of(fault: Fault) -> str:
             return "deaf" if fault.sends else "mute" if fault.hears else "cut"
         case _:
             assert_never(fault)
+
+
+def extent_of(fault: Fault) -> str:
+    """Where a partition or a jammed area is, as a word and numbers for the trace: `nodes` on one side, a `line` through
+    two points, a `circle` with its middle, radius and noise [dBm]. Empty for other faults.
+    """
+    match fault:
+        case Partition() if fault.group:
+            text = " ".join(["nodes", *map(str, fault.group)])
+            return text if len(text) <= LONGEST_EXTENT else ""
+        case Partition():
+            return " ".join(["line", *map(str, fault.line_m)])
+        case Jam():
+            return f"circle {fault.center.east} {fault.center.north} {fault.radius_m} {fault.noise_dbm}"
+        case _:
+            return ""
 
 
 def link_label(src: int, dst: int) -> str:

@@ -84,6 +84,8 @@ def _mission(found: Mapping[str, Any], *, confirms: bool) -> Iterator[tuple[str,
         yield "time until 95 % of the area were covered", "not within the run" if late is None else f"{number(late)} s"
     if found["connected"] is not None:
         yield "time in which all searching UAVs were connected", percent(found["connected"])
+        if (by_distance := found.get("connected_by_distance") or 0.0) > found["connected"]:
+            yield "the same without partitions and jammed areas", percent(by_distance)
         yield "time in which they would have been without any one of them", percent(found.get("biconnected"))
         for key, what in (
             ("cut_vertices", "UAVs whose loss would separate others: median, most"),

@@ -1,13 +1,13 @@
 """Who was within reach of whom, second by second, by the true positions in the trace and the reach of the channel.
 
-    link in second k   both on the air, and within reach at its beginning or at its end
+    link in second k   both on the air, within reach at its beginning or at its end, and not parted by a fault then
 
-Obstacles, fading and collisions are left out: this is what distance allows. `connectivity` is the same on the ideal
-track of the mobility model; no protocol that delivers packets at once can exceed it, one that carries packets for a
-while can.
+Obstacles, fading, weaker links and collisions are left out: this is what distance allows, and partitions and jammers.
+`connectivity` is the same on the ideal track of the mobility model; no protocol that delivers packets at once can
+exceed it, one that carries packets for a while can.
 """
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,7 @@ from fanet_mw.trace import Posed, ProcessEnded, ProcessStarted, RadioFault, Reco
 from fanet_mw.units import S
 from sim.records.record_kinds import records_of
 from sim.results.outcome import Outcome
+from sim.results.parted_air import Extent, PartedAir, parted
 from sim.world.arrays import Flags, Rows
 from sim.world.environment.layout import positions
 from sim.world.mobility.guidance import Guidance
@@ -84,7 +85,7 @@ class LinksOverTime:
     def __init__(self, outcome: Outcome) -> None:
         self._reach_m = heard_m(outcome.scenario.radio)
         self.seconds = max(1, -(-outcome.simulated_ns // S))
-        self._places = _places(outcome, self.seconds + 1)
+        self._instants = _instants(outcome, self.seconds + 1)
         self._near: dict[int, Flags] = {}
         self._links: dict[int, Flags] = {}
 
@@ -96,10 +97,11 @@ class LinksOverTime:
         return self._links[second]
 
     def _near_at(self, instant: int) -> Flags:
-        at = self._places[instant]
-        if id(at) not in self._near:
-            self._near[id(at)] = within(at, self._reach_m)
-        return self._near[id(at)]
+        now = self._instants[instant]
+        if id(now) not in self._near:
+            nodes = np.arange(1, len(now.at) + 1)
+            self._near[id(now)] = within(now.at, self._reach_m) & ~parted(now.extents, now.at, nodes)
+        return self._near[id(now)]
 
 
 def within(at: Rows, reach_m: float) -> Flags:
@@ -109,11 +111,18 @@ def within(at: Rows, reach_m: float) -> Flags:
     return near
 
 
-def _places(outcome: Outcome, count: int) -> list[Rows]:
-    """The positions at the beginning of each second, NaN of nodes off the air; one array while nothing changes."""
+class _Instant(NamedTuple):
+    """The positions, NaN of nodes off the air, and what parts the air."""
+
+    at: Rows
+    extents: tuple[Extent, ...]
+
+
+def _instants(outcome: Outcome, count: int) -> list[_Instant]:
+    """The beginning of each second; the same object while nothing changes."""
     at = np.array(positions(outcome.scenario), dtype=np.float64)
-    absent = Absentees()
-    found: list[Rows] = []
+    absent, air = Absentees(), PartedAir(outcome.scenario.radio)
+    found: list[_Instant] = []
     changed = True
 
     def fill(until: int) -> None:
@@ -122,7 +131,7 @@ def _places(outcome: Outcome, count: int) -> list[Rows]:
             if changed:
                 now = at.copy()
                 now[[node - 1 for node in absent.dead | absent.off_air if 1 <= node <= len(at)]] = np.nan
-            found.append(now if changed else found[-1])
+            found.append(_Instant(now, air.in_force) if changed else found[-1])
             changed = False
 
     for record in records_of(outcome.records, Posed, *Absentees.KINDS):
@@ -131,6 +140,8 @@ def _places(outcome: Outcome, count: int) -> list[Rows]:
             at[record.node - 1] = record.east_m, record.north_m, record.up_m
         else:
             absent.take(record)
+        if type(record) is RadioFault:
+            air.take(record)
         changed = True
     fill(count)
     return found

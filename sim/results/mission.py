@@ -9,6 +9,7 @@ from itertools import groupby
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from agents.mission.finding.known_survivors import SAME_PLACE_M
 from fanet_mw.scenario import Scenario
@@ -25,6 +26,7 @@ from fanet_mw.trace import (
     PlacedAmong,
     PlacedInside,
     Posed,
+    RadioFault,
     Record,
     Refuted,
 )
@@ -33,6 +35,7 @@ from fanet_mw.wire.survivors import is_person
 from sim.records.record_kinds import records_of
 from sim.results.coherence import Coherence, coherence
 from sim.results.links_over_time import Absentees, parts
+from sim.results.parted_air import Extent, PartedAir, parted
 from sim.world.arrays import Flags, Rows, Values
 from sim.world.environment.layout import positions
 from sim.world.environment.survivors import place
@@ -214,18 +217,25 @@ def _flown(scenario: Scenario, records: Iterable[Record]) -> dict[str, Any]:
     """Coverage and coherence; None if the trace has no positions."""
     covered, photographed = OverflownCells(scenario), PhotographedCells(scenario)
     graphs: list[Coherence] = []
+    by_distance: list[bool] = []
+    ever_parted = False
     with_post: list[bool] = []
     range_m, reaches = scenario.radio.range_m, max(scenario.reaches.values(), default=1.0)
     post = np.array(positions(scenario)[-1]) if scenario.post is not None else None
     nearly_all_ns: int | None = None
     nearest: list[Values] = []
-    for t_ns, at, searching in searching_instants(records):
+    for t_ns, at, nodes, searching, extents in _instants(scenario, records):
         apart = np.linalg.norm(at[:, None] - at[None], axis=2)
-        linked = apart[np.ix_(searching, searching)] <= range_m
+        those, ids = at[searching], nodes[searching]
+        near = apart[np.ix_(searching, searching)] <= range_m
+        linked = near & ~parted(extents, those, ids)
         graphs.append(coherence(linked))
+        by_distance.append(not parts(near).any() if extents else graphs[-1].connected)
+        ever_parted |= bool(extents)
         if post is not None:
             part = parts(linked)
-            heard = np.linalg.norm(at[searching] - post, axis=1) <= range_m * reaches
+            cut = parted(extents, np.vstack([those, post]), np.append(ids, scenario.node_count))[-1, :-1]
+            heard = (np.linalg.norm(those - post, axis=1) <= range_m * reaches) & ~cut
             with_post.append(bool(np.isin(part, part[heard]).all()))
         if len(at) > 1:
             np.fill_diagonal(apart, math.inf)
@@ -239,6 +249,7 @@ def _flown(scenario: Scenario, records: Iterable[Record]) -> dict[str, Any]:
         "covered_95_s": None if nearly_all_ns is None else round(nearly_all_ns / S, 3),
         "photographed": round(photographed.share, 6) if graphs and scenario.sensors.camera_hz else None,
         "connected": round(statistics.fmean(graph.connected for graph in graphs), 6) if graphs else None,
+        **({"connected_by_distance": round(statistics.fmean(by_distance), 6)} if ever_parted else {}),
         "post_connected": round(statistics.fmean(with_post), 6) if with_post else None,
         "biconnected": round(statistics.fmean(graph.biconnected for graph in graphs), 6) if graphs else None,
         "diameter": _usual([graph.diameter for graph in graphs]) if graphs else None,
@@ -256,15 +267,31 @@ def _usual(values: list[int]) -> dict[str, float]:
     return {"p50": statistics.median(values), "most": max(values)}
 
 
-def searching_instants(records: Iterable[Record]) -> Iterator[tuple[int, Rows, Flags]]:
-    """The instants with positions, the positions of the UAVs alive then, and which of these search."""
-    absent = Absentees()
+class _Instant(NamedTuple):
+    t_ns: int
+    at: Rows
+    """The positions of the UAVs alive."""
+    nodes: npt.NDArray[np.int64]
+    searching: Flags
+    extents: tuple[Extent, ...]
+    """What parts the air."""
+
+
+def _instants(scenario: Scenario, records: Iterable[Record]) -> Iterator[_Instant]:
+    """The instants with positions."""
+    absent, air = Absentees(), PartedAir(scenario.radio)
+    extents = air.in_force
     wrecked: set[int] = set()
     homeward: set[int] = set()
     returning: set[int] = set()
     rows: list[tuple[float, float, float]] = []
+    nodes: list[int] = []
     searching: list[bool] = []
     t_ns = 0
+
+    def instant() -> _Instant:
+        return _Instant(t_ns, np.array(rows), np.array(nodes), np.array(searching), extents)
+
     for record in records_of(records, *Absentees.KINDS, MissionModeChanged, FlightModeChanged, Posed):
         if type(record) is FlightModeChanged:
             wrecked |= {record.node} if record.mode == _WRECKED else set()
@@ -273,16 +300,19 @@ def searching_instants(records: Iterable[Record]) -> Iterator[tuple[int, Rows, F
             homeward = homeward | {record.node} if record.mode in _HOMEWARD else homeward - {record.node}
         elif type(record) is Posed:
             if record.t_ns != t_ns and rows:
-                yield t_ns, np.array(rows), np.array(searching)
-                rows, searching = [], []
-            t_ns = record.t_ns
+                yield instant()
+                rows, nodes, searching = [], [], []
+            t_ns, extents = record.t_ns, air.in_force
             if record.node not in absent.dead:
                 rows.append((record.east_m, record.north_m, record.up_m))
+                nodes.append(record.node)
                 searching.append(record.node not in homeward | wrecked | returning | absent.off_air)
         else:
             absent.take(record)
+            if type(record) is RadioFault:
+                air.take(record)
     if rows:
-        yield t_ns, np.array(rows), np.array(searching)
+        yield instant()
 
 
 class _Cells:

@@ -195,10 +195,12 @@ def _mission_rows(mission: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         images = (
             f" by phones, {mission['photographed']:.1%} by cameras" if mission.get("photographed") is not None else ""
         )
+        share, by_distance = mission["connected"], mission.get("connected_by_distance", mission["connected"])
+        faulty = f", {share:.1%} with partitions and jammed areas" if share < by_distance else ""
         yield (
             "search",
-            f"{mission['coverage']:.1%} of the area covered{images}, connected by distance "
-            f"{mission['connected']:.1%} of the time",
+            f"{mission['coverage']:.1%} of the area covered{images}, connected by distance {by_distance:.1%} of the "
+            f"time{faulty}",
         )
     times = mission["time_to_approach_s"]
     if times:

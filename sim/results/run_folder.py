@@ -106,6 +106,7 @@ class _ShownMission(_ShownShape):
     covered_95_s: Measured
     photographed: Share | None = None
     connected: Share | None
+    connected_by_distance: Share | None = None
     biconnected: Share | None = None
     cut_vertices: _ShownUsual | None = None
     diameter: _ShownUsual | None = None

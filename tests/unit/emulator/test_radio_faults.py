@@ -15,7 +15,7 @@ from fanet_mw.bus.messages import Poses, Reception, TxOutcome, TxRequest
 from fanet_mw.bus.radio_control import Control, Cut, Degrade, Jam, Partition, Restore
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario, config
-from fanet_mw.trace import RadioFault
+from fanet_mw.trace import RadioFault, line, parse
 from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, S
 
 MakeScenario = Callable[..., Scenario]
@@ -60,6 +60,17 @@ def test_a_node_cut_off_neither_hears_nor_is_heard_nor_sensed(make_scenario: Mak
     assert lost(air) == {"station_down": 3}
     copies = air.medium.report()["copies"]
     assert copies["on_air"] == 4 == copies["received"] + 3
+
+
+def test_the_trace_says_where_the_air_is_parted_and_jammed(make_scenario: MakeScenario) -> None:
+    air = Air(make_scenario(**{"nodes.count": 3}), [0, 100, 200])
+    two = Partition("p", (NodeId(3), NodeId(1)), (0.0, 0.0, 0.0, 0.0))
+    control(air, two, two._replace(group=(), line_m=(1.5, 0.0, 0.0, -9.0)), jam(5.0, 20.0), cut(2))
+    records = [record for record in air.medium.records if isinstance(record, RadioFault)]
+    assert [record.extent for record in records if record.active] == [
+        "nodes 3 1", "line 1.5 0.0 0.0 -9.0", "circle 5.0 0.0 20.0 inf", "",
+    ]  # fmt: skip
+    assert [parse(line(record)) for record in records] == records
 
 
 def test_unicast_to_a_node_cut_off_is_given_up_and_counted_as_that(make_scenario: MakeScenario) -> None:

@@ -9,6 +9,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from kit import examples
 
+from fanet_mw.bus.radio_control import Jam, Partition, extent_of
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import (
     Approaching,
@@ -24,7 +25,7 @@ from fanet_mw.trace import (
     Record,
     Refuted,
 )
-from fanet_mw.units import Enu, S
+from fanet_mw.units import Enu, NodeId, S
 from fanet_mw.wire.survivors import person_id
 from sim.results.mission import Confirmations, OverflownCells, PhotographedCells, mission
 from sim.world.sensors.phone import REFERENCE_LOSS_DB
@@ -156,6 +157,46 @@ def test_who_is_taken_off_the_air_need_not_be_in_reach_until_the_fault_ends(kind
     both = [fault(1, active=True), fault(1, active=True, label="b"), fault(1, active=False), *poses(2, *away)]
     assert measured(both)["connected"] == 1.0, "the other one lasts"
     assert measured([fault(1, active=True, kind="jam"), *poses(2, *away)])["connected"] == 0.0, "it is on the air"
+
+
+def sides(*group: int, line_m: tuple[float, float, float, float] = (0, 0, 0, 0)) -> str:
+    return extent_of(Partition("a", tuple(map(NodeId, group)), line_m))
+
+
+def jammed(radius_m: float, noise_dbm: float) -> str:
+    return extent_of(Jam("a", Enu(0.0, 40.0, 0.0), radius_m, noise_dbm))
+
+
+@pytest.mark.parametrize(
+    ("extent", "connected", "post"),
+    [
+        (sides(2), 0.5, 0.5),
+        (sides(4, 1), 0.5, 0.5),
+        (sides(4), 1.0, 0.5),
+        (sides(1, 2, 3), 1.0, 0.5),
+        (sides(line_m=(0, 45, 9, 45)), 0.5, 0.5),
+        (sides(line_m=(45, 0, 45, 9)), 1.0, 1.0),
+        (jammed(11, -60), 0.5, 0.5),
+        (jammed(9, math.inf), 1.0, 1.0),
+        ("circle 0.0 40.0 99.0", 1.0, 1.0),
+        ("circle 0.0 40.0 nan 0.0", 1.0, 1.0),
+        ("nodes two", 1.0, 1.0),
+    ],
+)
+def test_nobody_is_connected_over_a_partition_or_into_a_jammed_area(extent: str, connected: float, post: float) -> None:
+    fault = RadioFault(2 * S, 0, 0, "any", "a", active=True, extent=extent)
+    places = (0.0, 10.0), (0.0, 50.0), (0.0, 90.0)
+    records = [*poses(1, *places), fault, *poses(2, *places), fault._replace(active=False), *poses(3, *places)]
+    found = measured([*records, fault, *poses(4, *places)], ground={"at_m": (-5.0, 0.0), "gain_dbi": 0.0})
+    assert (found["connected"], found["post_connected"]) == (connected, post)
+    assert found.get("connected_by_distance") in {1.0: (None, 1.0), 0.5: (1.0,)}[connected]
+
+
+@pytest.mark.parametrize(("noise_dbm", "connected"), [(-60.0, 1.0), (math.inf, 0.0)])
+def test_a_jammer_is_counted_where_it_leaves_nothing(noise_dbm: float, connected: float) -> None:
+    jam = RadioFault(0, 0, 0, "jam", "a", active=True, extent=jammed(11, noise_dbm))
+    records = [jam, *poses(1, (0.0, 10.0), (0.0, 50.0), (0.0, 90.0))]
+    assert measured(records, radio={"channel": "air_to_air"})["connected"] == connected
 
 
 def test_shares_have_six_digits_and_links_end_at_the_range() -> None:

@@ -79,6 +79,11 @@ def rows(*path: str, **keys: Any) -> list[str]:
     return [line for line in printed(changed) if line not in before]
 
 
+def test_faults_that_parted_the_air_are_told_beside_the_share_by_distance() -> None:
+    (said,) = rows("mission", connected_by_distance=0.9)
+    assert said.endswith("connected by distance 90.0% of the time, 13.6% with partitions and jammed areas")
+
+
 def test_all_that_there_is_to_tell_of_a_run() -> None:
     assert printed(EVERYTHING) == [
         "hills, 21 nodes, seed 22, real processes, swarm clock at 0.8 for 25 s, slower for 53 s (at least 0.4): "

@@ -96,6 +96,13 @@ def test_a_cut_radio_reaches_nobody(scenario: Scenario) -> None:
     assert reachable(scenario, cut, flight(0), packet(2, (2, 0.1)))["share"] == 0.5
 
 
+def test_over_a_partition_nobody_is_reached_until_it_ends(scenario: Scenario) -> None:
+    begins = RadioFault(0, 0, 0, "partition", "a", active=True, extent="nodes 3")
+    cut: list[Record] = [begins, begins._replace(t_ns=4 * S, active=False)]
+    assert reachable(scenario, cut[:1], flight(0), packet(2, (2, 0.1)))["share"] == 0.5
+    assert reachable(scenario, cut, flight(0), packet(2, (2, 0.1)))["share"] == 1.0
+
+
 def test_the_bound_is_asked_of_those_that_were_in_reach_within_it(scenario: Scenario) -> None:
     found = reachable(scenario, flight(4), packet(2, (2, 0.1), (3, 2.5), bound_ms=500))
     assert (found["pdr"], found["within_share"]) == (1.0, 1.0)

@@ -167,7 +167,7 @@ class Forked(Flight, Parted):
         """The search on board of each UAV; what it knows is not told to anybody, so this looks inside."""
         found = {}
         for actor in self._actors:
-            uav = actor._uav if isinstance(actor, StoppableUav) else actor
+            uav = actor.alive if isinstance(actor, StoppableUav) else actor
             if isinstance(uav, Uav):
                 applications = uav._onboard._applications
                 found[int(uav._node.node)] = next(a._searcher for a in applications if isinstance(a, PlannedSearch))

@@ -88,7 +88,7 @@ def judge_rounds(
         item(
             "urgent",
             f"{bound} at the starting positions, {law.hop_ns / MS:.1f} ms for each further hop, while at most "
-            f"{scenario.rounds.burst_bytes} B are under way; from {law.silent_ns / S:.1f} s on, when links are known",
+            f"{scenario.rounds.burst_bytes} B are under way; from {law.found_ns / S:.1f} s on, when links are known",
         ),
         item("turns", f"carry {carried / 1000:.1f} kB/s of urgent packets, the traffic has {offered / 1000:.1f} kB/s"),
         item("bulk", _of_bulk(load) if timing.slots else "goes in turns, too"),
@@ -96,7 +96,7 @@ def judge_rounds(
     content: dict[str, Any] = {
         "feasible": feasible, "problems": problems, "period_ms": timing.period_ns / MS, "turn_ms": timing.turn_ns / MS,
         "slots": timing.slots, "slot_ms": timing.slot_ns / MS, "hop_ms": law.hop_ns / MS, "hops": hops,
-        "bound_ms": None if bound_ns is None else bound_ns / MS, "from_s": law.silent_ns / S,
+        "bound_ms": None if bound_ns is None else bound_ns / MS, "from_s": law.found_ns / S,
         "carried_bytes_per_s": carried, "offered_bytes_per_s": offered,
         "bulk": None if load is None else load._asdict(),
     }  # fmt: skip

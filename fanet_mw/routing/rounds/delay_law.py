@@ -19,7 +19,7 @@ from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.routing.rounds.topology import Topology
 from fanet_mw.scenario import Scenario
 from fanet_mw.timesync.turn_slack import clocks_fit
-from fanet_mw.units import US, NodeId, S, seconds_to_ns
+from fanet_mw.units import MS, US, NodeId, S, seconds_to_ns
 from fanet_mw.wire import HEADER_BYTES, PRIORITIES, PRIORITY_BULK
 from fanet_mw.wire.hello import PLAIN_BYTES
 from fanet_mw.wire.hello.digest import MESSAGE_BYTES
@@ -31,6 +31,11 @@ PATIENT_TURNS: Final = 2
 MOST_HOPS: Final = 32
 """The hops for which a statement about links lives at least."""
 _SILENT_HELLOS: Final = 1.6
+_SILENT_ROUNDS: Final = 5
+_SILENT_LEAST_NS: Final = 700 * MS
+"""A process may be held up for a while: a shorter silence says nothing."""
+_SPEAKS: Final = 3
+"""So often at least a node sends something in the time after which it would be missed."""
 _MOST_USED: Final = 0.75
 _MOST_URGENT: Final = 0.5
 """No bound is stated while more urgent packets use a greater share of turns."""
@@ -70,8 +75,15 @@ class DelayLaw:
         if scenario.clock.sync == "beacons":
             self.hop_ns += timing.period_ns  # hellos have turns of their own
         hello_ns = seconds_to_ns(scenario.routing.hello_interval_s) or S
-        self.silent_ns = round(_SILENT_HELLOS * hello_ns) + self.hop_ns
+        missed_ns = round(_SILENT_HELLOS * hello_ns)
+        self.found_ns = missed_ns + self.hop_ns
+        """After so long whoever is near has been heard."""
+        if not self.loses_frames:  # else several frames in a row may be lost
+            missed_ns = min(missed_ns, max(_SILENT_ROUNDS * timing.period_ns, _SILENT_LEAST_NS))
+        self.silent_ns = missed_ns + self.hop_ns
         """A neighbor that was not heard for so long is none."""
+        self.speaks_ns = missed_ns // _SPEAKS
+        """A node that has sent nothing for so long uses its turn though it has nothing new."""
         self.epoch_ns = max(hello_ns // 4, 1)
         self._waiting_bytes = 0.0
         self._greatest = 0
@@ -207,7 +219,7 @@ class DelayLaw:
 
     def absent(self, topology: Topology, *, now_ns: int) -> Sequence[NodeId] | None:
         """The nodes to which a bound does not apply, because no way leads to them; None while one may yet be found."""
-        return topology.absent(now_ns, doubt_ns=self.silent_ns)
+        return topology.absent(now_ns, doubt_ns=self.found_ns)
 
 
 class LikelyDelay:

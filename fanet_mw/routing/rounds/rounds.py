@@ -160,12 +160,15 @@ class RoundFlooding(RoutingProtocol):
         """The next own turn that may still be filled."""
         self._turn_asked = False
         """Whether something waited for it when it could still be announced in time."""
+        self._speaks_ns = 0
+        """The own turn that is used even if there is nothing new to say, because this node would be missed."""
         self._stated = 0
         self._now_ns = 0
 
     def start(self, now_ns: int) -> None:
         self._topology.state(0, often=False, now_ns=now_ns)
         self._turn_ns = self._timing.turn_start_ns(self._port.node, from_ns=now_ns + self._lead_ns)
+        self._speak_after(self._turn_ns)
 
     # --- packets --------------------------------------------------------------------------------------------------
 
@@ -349,7 +352,11 @@ class RoundFlooding(RoutingProtocol):
             else:
                 self._hello_waits += 1
         if together:
+            self._speak_after(turn_ns)
             self._port.transmit_together(together, flags=FLAG_FLOOD, at_ns=(turn_ns,))
+
+    def _speak_after(self, turn_ns: int) -> None:
+        self._speaks_ns = self._timing.turn_start_ns(self._port.node, from_ns=turn_ns + self._law.speaks_ns)
 
     def _add_hello(self, together: list[Packet]) -> int:
         hello, self._hello, self._hello_waits = self._hello, None, 0
@@ -369,11 +376,13 @@ class RoundFlooding(RoutingProtocol):
         header = packet.header
         return at_ns - header.origin_us * US > self._lifetimes_ns[header.priority]
 
-    def _told(self, room: int, now_ns: int) -> Packet | None:
-        """What this node tells its neighbors of links and held packets, if there is anything and room for it."""
+    def _told(self, room: int, now_ns: int, *, ahead: bool = False) -> Packet | None:
+        """What this node tells its neighbors of links and held packets, if there is anything and room for it; `ahead`
+        of its turn: of changed links alone.
+        """
         room -= HEADER_BYTES
         inner = b""
-        if self._held and room >= HELD_BYTES:
+        if self._held and not ahead and room >= HELD_BYTES:
             told = list(self._held)[: room // HELD_BYTES * CAPACITY]
             for key in told:
                 del self._held[key]
@@ -387,7 +396,7 @@ class RoundFlooding(RoutingProtocol):
         if self._topology.news and room >= HEARD_BYTES:
             count = self._port.scenario.node_count
             most = room // HEARD_BYTES * heard_capacity(count)
-            inner += encode_heard(self._topology.take_news(most), self._port.node, count=count)
+            inner += encode_heard(self._topology.take_news(most, ahead=ahead), self._port.node, count=count)
         if not inner:
             return None
         return self._port.announce(Kind.ROUND, inner, now_ns=now_ns, flags=FLAG_FLOOD, hop_limit=1)
@@ -402,8 +411,12 @@ class RoundFlooding(RoutingProtocol):
         self._topology.hear(heard, now_ns=now_ns)
         if self._topology.news:
             self._reach_turn(now_ns)
-            if self._timing.slots and self._topology.is_partial:
-                self._reach_slot(now_ns, now_ns)
+            self._hurry_changes(now_ns)
+
+    def _hurry_changes(self, now_ns: int) -> None:
+        """What has changed about links goes in a bulk slot if one comes before the turn."""
+        if self._timing.slots and self._topology.has_changes:
+            self._reach_slot(now_ns, now_ns)
 
     # --- bulk -----------------------------------------------------------------------------------------------------
 
@@ -463,8 +476,8 @@ class RoundFlooding(RoutingProtocol):
             rounds = min(_MOST_ROUNDS, 1 << times)
             again_ns = slot_ns + 2 * (self._law.hop_ns + self._blind_ns) + rounds * self._timing.period_ns
             self._spreading.look_again(packet, from_ns=again_ns)
-        if self._topology.is_partial:  # else turns tell all at once
-            told = self._told(room, now_ns)
+        if self._topology.has_changes:
+            told = self._told(room, now_ns, ahead=True)
             together += [told] if told is not None else []
         if together:
             self._port.transmit_together(together, flags=FLAG_FLOOD, at_ns=(slot_ns,))
@@ -489,6 +502,9 @@ class RoundFlooding(RoutingProtocol):
         old_ns = now_ns - self._flood_ns
         if self._topology.reaches(src, now_ns):
             self._spreading.assume(src, until_ns=old_ns)
+        else:
+            self._topology.repeat_all()
+            self._hurry_changes(now_ns)
         for key in self._spreading.recent(old_ns):
             self._held[key] = None
 
@@ -565,6 +581,8 @@ class RoundFlooding(RoutingProtocol):
             self._held or self._hello is not None or self._spreading.urgent or self._topology.news
         ):
             first_ns = turn_ns
+        if self._speaks_ns - self._lead_ns < first_ns:
+            first_ns = self._speaks_ns - self._lead_ns
         if slot_ns is not None and slot_ns - self._lead_ns < first_ns:
             first_ns = slot_ns - self._lead_ns
         if repair is not None and repair.pending:
@@ -579,9 +597,14 @@ class RoundFlooding(RoutingProtocol):
             waiting = self._spreading.due_bulk()  # what others are to send must not take the relays' slots
             self._often = self._topology.dominates() or waiting >= (1 if self._often else _MUCH_BULK)
             self._topology.state(self._stayers(now_ns), often=self._often, now_ns=now_ns)
+            self._hurry_changes(now_ns)
         self._repair_due(now_ns)
         if self._slot_ns is not None and self._slot_ns - self._lead_ns <= now_ns:
             self._use_slot(self._slot_ns, now_ns)
+        if self._speaks_ns - self._lead_ns <= now_ns:
+            self._topology.repeat()
+            self._speak_after(now_ns + self._lead_ns)
+            self._reach_turn(now_ns)
         turn_ns = self._turn_ns
         if turn_ns - self._lead_ns > now_ns:
             return

@@ -50,6 +50,8 @@ class Topology:
         """The nodes with which each node has links, by its id; the first entry is of no node."""
         self.news: dict[NodeId, None] = {}
         """The nodes of which something is to be passed on, in the order in which it was heard."""
+        self._hasty: dict[NodeId, None] = {}
+        """Those of them who hear others than before, until that went ahead in a bulk slot."""
         self._oldest = 0
         """The epoch of the oldest statement is this one, or a later one."""
         self._own_epoch = -1
@@ -130,6 +132,7 @@ class Topology:
         changed = heard if known is None else heard ^ known.told.heard
         self.changes += changed != 0 or known is None or known.told.often != often
         if changed or known is None:
+            self._hasty[node] = None
             self._relink(node, heard, changed)
 
     def _relink(self, node: NodeId, heard: int, changed: int) -> None:
@@ -150,13 +153,32 @@ class Topology:
         self.changes += 1
         heard = self._stated.pop(node).told.heard
         self.news.pop(node, None)
+        self._hasty.pop(node, None)
         self._relink(node, 0, heard)
 
-    def take_news(self, most: int) -> list[HeardNodes]:
-        nodes = list(self.news)[:most]
+    def take_news(self, most: int, *, ahead: bool = False) -> list[HeardNodes]:
+        """`ahead`: changes alone, which stay news, because a frame in a bulk slot may be destroyed."""
+        nodes = list(self._hasty if ahead else self.news)[:most]
         for node in nodes:
-            del self.news[node]
+            self._hasty.pop(node, None)
+            if not ahead:
+                del self.news[node]
         return [self._stated[node].told for node in nodes]
+
+    @property
+    def has_changes(self) -> bool:
+        """True while changes are to be passed on in a bulk slot."""
+        return bool(self._hasty)
+
+    def repeat(self) -> None:
+        """Tell the neighbors once more what this node has stated; they do not pass it on."""
+        if self._node in self._stated:
+            self.news[self._node] = None
+
+    def repeat_all(self) -> None:
+        """Tell a node of another part what all have stated; it passes on what its part does not know."""
+        self.news |= dict.fromkeys(self._stated)
+        self._hasty |= dict.fromkeys(self._stated)
 
     # --- what follows from it -------------------------------------------------------------------------------------
 
@@ -234,11 +256,6 @@ class Topology:
             reached = reduce(or_, self._rings_from(self._node, without=passed))
             self._parted = nodes_of(self._known & ~reached)
         return self._parted
-
-    @property
-    def is_partial(self) -> bool:
-        """True while this node has links, and there are nodes to which it knows no way."""
-        return bool(self._unreached_ns) and self.links[self._node] != 0
 
     def rivals(self, near: int) -> list[tuple[NodeId, bool]]:
         """The nodes within two hops, if this node hears `near`, and whether each takes part in bulk slots often."""

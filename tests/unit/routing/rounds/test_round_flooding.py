@@ -1,6 +1,7 @@
 """One node that floods in rounds: what it sends in its turns and in its bulk slots, and what it tells its neighbors."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from itertools import pairwise
 
 import pytest
 from kit import MakeScenario
@@ -9,6 +10,7 @@ from fanet_mw import wire
 from fanet_mw.bus.messages import Reception, TxRequest
 from fanet_mw.node.node import Node
 from fanet_mw.routing import make_protocol
+from fanet_mw.routing.rounds.delay_law import DelayLaw
 from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.units import BROADCAST, MS, Enu, NodeId, S
 from fanet_mw.wire import (
@@ -23,7 +25,7 @@ from fanet_mw.wire import (
 )
 from fanet_mw.wire.aggregation import unbundle
 from fanet_mw.wire.hello.digest import Digest
-from fanet_mw.wire.rounds import HeldPacket, decode_heard, decode_held
+from fanet_mw.wire.rounds import HeardNodes, HeldPacket, decode_heard, decode_held, encode_heard
 
 OURS, NEAR, NEW = NodeId(2), NodeId(3), NodeId(4)
 MakeNode = Callable[..., Node]
@@ -76,10 +78,10 @@ def test_bulk_goes_in_a_slot_and_is_told_in_the_turn(make_node: MakeNode) -> Non
     timing = RoundTiming.of(node.scenario)
     run(node, 1 * S)
     hear(node, 7, src=NEAR, at_ns=1 * S)
-    sent = run(node, 2 * S, from_ns=1 * S)
+    sent = run(node, 1500 * MS, from_ns=1 * S)
     assert held_in(sent)[0] == HeldPacket(7, NEAR)
-    hear(node, 8, src=NEW, at_ns=2 * S)
-    slots = [each for each in run(node, 3 * S, from_ns=2 * S) if wire.decode_header(each.frame).kind == Kind.DATA]
+    hear(node, 8, src=NEW, at_ns=1500 * MS)
+    slots = [each for each in run(node, 2 * S, from_ns=1500 * MS) if wire.decode_header(each.frame).kind == Kind.DATA]
     assert slots, "the neighbor 3 was not heard to have packet 8"
     assert all(each.start_ns == timing.slot_start_ns(timing.slot_from(each.start_ns)) for each in slots)
 
@@ -101,6 +103,79 @@ def test_an_urgent_packet_goes_in_the_bulk_slot_before_the_turn_and_in_the_turn(
     ]
     assert starts[-1] == turn_ns, "the neighbor 4 was not heard to have it"
     assert any(born_ns < start_ns < turn_ns for start_ns in starts)
+
+
+def states(node: int, heard: Sequence[int], *, epoch: int) -> bytes:
+    """What a node says about whom it hears."""
+    bits = sum(1 << (one - 1) for one in heard)
+    return encode_heard([HeardNodes(NodeId(node), epoch % 256, bits)], NEAR, count=10)
+
+
+def hear_of_links(node: Node, told: bytes, *, at_ns: int) -> None:
+    header = Header(
+        at_ns // 1000, at_ns % 10_000, NEAR, BROADCAST, NEAR, Kind.ROUND, 1, 0, PRIORITY_CONTROL, FLAG_FLOOD
+    )
+    node.hear(Reception(header.encode() + told, NEAR, at_ns, -60.0), at_ns)
+
+
+def stated_in(sent: Sequence[TxRequest], node: int) -> list[tuple[int, HeardNodes]]:
+    """When a frame told what about whom a node hears."""
+    frames = [(each.start_ns, packet) for each in sent for packet in unbundle(each.frame)]
+    return [(at_ns, one) for at_ns, packet in frames for one in decode_heard(packet) if one.node == node]
+
+
+def test_a_node_with_nothing_new_to_say_is_heard_often_enough_not_to_be_missed(make_node: MakeNode) -> None:
+    node = make_node(**{"routing.hello_interval_s": 2})
+    starts = list[int]()
+    for step in range(50):
+        at_ns = 1 * S + step * 100 * MS
+        hear(node, step, src=NEAR, at_ns=at_ns, kind=Kind.ROUND, priority=PRIORITY_CONTROL)
+        starts += [each.start_ns for each in run(node, at_ns + 100 * MS, from_ns=at_ns)]
+    silent_ns = DelayLaw(RoundTiming.of(node.scenario), node.scenario).silent_ns
+    assert max(later - before for before, later in pairwise(starts)) <= silent_ns // 2
+
+
+def test_a_neighbor_that_is_silent_for_five_rounds_is_none_before_its_next_hello_would_be_missed(
+    make_node: MakeNode,
+) -> None:
+    node = make_node()
+    hear(node, 1, src=NEAR, at_ns=1 * S, kind=Kind.ROUND, priority=PRIORITY_CONTROL)
+    told = stated_in(run(node, 3 * S, from_ns=1 * S), OURS)
+    drops_ns = next(at_ns for at_ns, one in told[1:] if not one.heard)
+    assert 1700 * MS < drops_ns < 2300 * MS
+
+
+def test_a_change_of_links_goes_in_a_bulk_slot_before_the_turn_and_in_the_turn_and_what_is_as_before_in_the_turn(
+    make_node: MakeNode,
+) -> None:
+    node = make_node()
+    timing = RoundTiming.of(node.scenario)
+    ahead = {True: 0, False: 0}
+    for epoch in range(5, 25):
+        changes = epoch % 2 == 0
+        at_ns = timing.turn_start_ns(OURS, from_ns=epoch * S // 4 + 100 * MS) + MS
+        run(node, at_ns)
+        hear_of_links(node, states(9, (3, 7) if epoch % 4 < 2 else (3,), epoch=epoch), at_ns=at_ns)
+        turn_ns = timing.turn_start_ns(OURS, from_ns=at_ns)
+        starts = [start_ns for start_ns, _ in stated_in(run(node, turn_ns + 1, from_ns=at_ns), 9)]
+        assert starts[-1] == turn_ns
+        ahead[changes] += starts[0] < turn_ns
+    assert ahead[True], "some slots come before the turn"
+    assert not ahead[False]
+
+
+def test_who_comes_from_another_part_is_told_what_all_have_stated_and_who_was_in_this_part_is_not(
+    make_node: MakeNode,
+) -> None:
+    node = make_node()
+    hear_of_links(node, states(NEAR, (OURS, 9), epoch=4), at_ns=1 * S)
+    hear_of_links(node, states(9, (NEAR,), epoch=4), at_ns=1 * S)
+    assert stated_in(run(node, 1300 * MS, from_ns=1 * S), 9)
+    hear_of_links(node, states(NEAR, (OURS, 9), epoch=5), at_ns=1300 * MS)
+    hear(node, 5, src=NodeId(9), at_ns=1300 * MS, kind=Kind.ROUND, priority=PRIORITY_CONTROL)
+    assert not stated_in(run(node, 1500 * MS, from_ns=1300 * MS), 9)
+    hear(node, 6, src=NEW, at_ns=1500 * MS, kind=Kind.ROUND, priority=PRIORITY_CONTROL)
+    assert stated_in(run(node, 1700 * MS, from_ns=1500 * MS), 9)
 
 
 def test_who_comes_near_is_told_of_recent_bulk(make_node: MakeNode) -> None:
@@ -200,10 +275,10 @@ def test_who_sends_in_another_ones_turn_is_no_link_but_a_frame_that_somebody_rep
 
     run(node, 5 * S)
     at_ns = in_turn_of(NEAR, 1, from_ns=5 * S)
-    run(node, at_ns + S, from_ns=at_ns)
-    at_ns = in_turn_of(NEAR, 2, from_ns=at_ns + S)
+    run(node, at_ns + S // 2, from_ns=at_ns)
+    at_ns = in_turn_of(NEAR, 2, from_ns=at_ns + S // 2)
     at_ns = in_turn_of(NEW, 3, from_ns=at_ns, made_ns=made_ns)
-    sent = run(node, at_ns + S, from_ns=at_ns)
+    sent = run(node, at_ns + S // 2, from_ns=at_ns)
     told = [one for each in sent for packet in unbundle(each.frame) for one in decode_heard(packet) if one.node == OURS]
     assert bool(told[-1].heard >> (NEAR - 1) & 1) == counts
 
@@ -215,6 +290,6 @@ def test_who_falls_says_that_it_has_no_links_so_that_others_exclude_it_before_it
     node = make_node()
     hear(node, 1, src=NEAR, at_ns=5 * S, kind=Kind.ROUND, priority=PRIORITY_CONTROL)
     node.moved(Enu(0.0, 0.0, 50.0), Enu(0.0, 0.0, -sinks_m_s))
-    sent = run(node, 6 * S, from_ns=5 * S)
+    sent = run(node, 5500 * MS, from_ns=5 * S)
     told = [one for each in sent for packet in unbundle(each.frame) for one in decode_heard(packet) if one.node == OURS]
     assert bool(told and told[-1].heard >> (NEAR - 1) & 1) == counts

@@ -1,7 +1,7 @@
 """Connectivity maintenance: half-planes of velocities that keep a UAV within radio reach of those it is tied to."""
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import Final
 
 from agents.mission.navigation.half_planes import HalfPlane, Velocity
@@ -29,6 +29,11 @@ turns back for its chain rather than hold it back.
 _LED: Final = 0.8
 """Before the sweep a UAV without a task keeps within this share of the reach of a neighbor that responds: otherwise the
 responder would be held where its links end, before it sees the survivor.
+"""
+_LED_PER_HOP: Final = 0.04
+_LED_HOPS: Final = 4
+"""A UAV up to so many hops from the responder keeps within so much more of the reach, for each hop, of neighbors that
+are nearer to it: a whole row gives way a little, where one alone would hold the responder back.
 """
 _HASTE: Final = 0.95
 """Whoever is too far away for that is approached at this share of the greatest speed."""
@@ -99,18 +104,32 @@ class ConnectivityMaintenance:
         return planes + closer  # who cannot follow so close stays in reach
 
     def _led(self, ties: dict[NodeId, Motion], offsets: dict[NodeId, Enu], now_ns: int) -> list[HalfPlane]:
-        """The limits before the sweep that keep a UAV without a task near those who respond, and one that responds
-        after others near those who arrive first at some survivor: it would hold them back where their links end.
+        """The limits before the sweep that keep a UAV without a task near those who respond, and those who follow, and
+        one that responds after others near those who arrive first at some survivor: it would hold them back where
+        their links end.
         """
         if self._formation.is_taken_up(now_ns) or self._bidding.is_first(now_ns):
             return []
         responding = self._bidding.responders(now_ns, first=self._bidding.survivor is not None)
-        planes = [
-            self._plane(offsets[node], ties[node].velocity, _LED, _CLOSING_S)
-            for node in sorted(ties)
-            if node in responding
-        ]
+        responders_at = [at for at in map(self._formation.last_seen, sorted(responding)) if at is not None]
+        planes = []
+        for node in sorted(ties):
+            share = _LED if node in responding else self._share_led(ties[node], offsets[node], responders_at, now_ns)
+            if share is not None:
+                planes.append(self._plane(offsets[node], ties[node].velocity, share, _CLOSING_S))
         return [plane for plane in planes if plane is not None]
+
+    def _share_led(self, motion: Motion, offset: Enu, responders_at: Sequence[Enu], now_ns: int) -> float | None:
+        """The share of the reach within which this UAV keeps to a neighbor because that is nearer to one that responds,
+        which may be out of reach; None if it need not.
+        """
+        if offset.horizontal() < _LED * self._reach_m:
+            return None
+        here, there = self._own_motion.position, motion.position_at(now_ns)
+        ways_m = [(here.horizontal_to(at), there.horizontal_to(at)) for at in responders_at]
+        hops = [math.ceil(own_m / self._reach_m) for own_m, left_m in ways_m if left_m < own_m]
+        least = min((count for count in hops if 1 < count <= _LED_HOPS), default=None)
+        return None if least is None else _LED + _LED_PER_HOP * (least - 1)
 
     def _plane(self, offset: Enu, velocity: Enu, share: float, within_s: float) -> HalfPlane | None:
         """The limit that keeps this UAV within a share of the reach of another one."""

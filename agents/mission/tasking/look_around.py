@@ -15,7 +15,7 @@ from fanet_mw.units import Enu, S
 
 _LIKELY: Final = 9.0
 """Places less probable than the most probable one by more than this are not looked at (twice a log-likelihood)."""
-_PER_M: Final = 1 / 40.0
+_PER_M: Final = 1 / 100.0
 """By how much a place must be more probable to be chosen although it is a metre farther away."""
 _OTHERS: Final = 2.0
 """By how much a place must be more probable to be chosen although another UAV is nearer to it."""
@@ -53,7 +53,7 @@ class LookAround:
                 continue
             away_m = math.hypot(east - here.east, north - here.north)
             cost = deficit / 2 + _PER_M * away_m
-            if any(math.hypot(east - other.east, north - other.north) < away_m for other in others):
+            if any(math.hypot(east - other.east, north - other.north) <= away_m for other in others):
                 cost += _OTHERS
             if best is None or (cost, east, north) < best:
                 best = cost, east, north

@@ -183,6 +183,35 @@ def test_before_the_sweep_a_uav_without_a_task_follows_a_neighbor_who_responds(n
     assert flies_m_s() == pytest.approx(alone_m_s), "who responds itself before others does not"
 
 
+@pytest.mark.parametrize(
+    ("apart_m", "responder_m", "flies"),
+    [
+        (215.0, 400.0, True),
+        (215.0, -400.0, False),
+        (205.0, 400.0, False),
+        (215.0, 700.0, False),
+        (235.0, 900.0, True),
+        (235.0, 1100.0, False),
+    ],
+    ids=["drawn along", "to the other side", "near enough", "far away: a little", "farther: less", "too far away"],
+)
+def test_before_the_sweep_a_row_gives_way_to_a_responder_at_its_end(
+    apart_m: float, responder_m: float, *, flies: bool
+) -> None:
+    """Those beside a responder were held by those behind them: it hovered 70 m beside somebody (rescue, seed 4)."""
+    node, beside, responder, now_ns = NodeId(34), NodeId(35), NodeId(36), 30 * S
+    board = Board(node, Enu(0, 0, UP_M))
+    board.hear(1, Enu(responder_m, 0, 0), range(36, 38), now_ns=now_ns)
+    board.neighbors.on_hello(beside, Motion(Enu(apart_m, 0, UP_M), STILL, now_ns))
+    board.place.see(responder, Enu(responder_m, 0, UP_M), now_ns)
+    tied = ConnectivityMaintenance(
+        board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M, speed_m_s=10.0
+    )
+    assert nearest((0.0, 0.0), tied.planes(now_ns), limit=10, hard=0)[0] == 0, "nobody responds"
+    board.tasks.merge([Bid(1, responder, 900, serial=1)], now_ns=now_ns)
+    assert (nearest((0.0, 0.0), tied.planes(now_ns), limit=10, hard=0)[0] > 0) is flies
+
+
 def test_before_the_sweep_who_comes_second_for_somebody_does_not_hold_back_who_is_first_for_another() -> None:
     node, first, now_ns = NodeId(34), NodeId(35), 30 * S
     board = Board(node, Enu(0, 0, UP_M))

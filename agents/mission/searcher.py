@@ -27,6 +27,7 @@ from agents.mission.flight.search_limits import SearchLimits
 from agents.mission.flight.take_off import TakeOff, take_off_ns, turns_ns
 from agents.mission.flight.velocity_choice import VelocityChoice
 from agents.mission.navigation.known_obstacles import KnownObstacles
+from agents.mission.navigation.lines_of_sight import LinesOfSight
 from agents.mission.navigation.neighbor_motions import NeighborMotions, RadarWatch
 from agents.mission.navigation.onboard_map import OnboardMap
 from agents.mission.navigation.own_motion import OwnMotion
@@ -70,6 +71,8 @@ _MOST_DECADES: Final = 12.0
 _OFFSET_DB: Final = 1.0
 """The standard deviation that is assumed for the difference between one phone's power and the mean of all phones."""
 _REVIEW_NS: Final = 1 * S
+_SIGHT_NS: Final = 500 * MS
+"""The interval at which it is found to whom the line of sight ends."""
 _ROLL_NS: Final = 200 * MS
 """The interval at which it is found who is lost."""
 _LEAST_RECOGNIZED: Final = 0.1
@@ -128,6 +131,8 @@ class Searcher:
         self._sightings = Sightings(scenario, node, survivors, own_motion, outbox)
         self._announcing = Announcing(node, survivors, outbox)
         self._map = onboard_map
+        self._sight = LinesOfSight(onboard_map) if scenario.buildings_cut_links else None
+        self._next_sight_ns = 0
         self._approach = approach = Approach(
             node, survivors, own_motion, neighbors, outbox,
             arrival_m=mission.arrival_m, speed_m_s=speed_m_s, looked_at=looked_at,
@@ -276,6 +281,10 @@ class Searcher:
         self._flight.fix(position, velocity, self._bidding.survivor, now_ns=now_ns)
         if self._radio is not None:
             self._radio.hold(self._flight.held)
+            if self._sight is not None and now_ns >= self._next_sight_ns:
+                self._next_sight_ns = now_ns + _SIGHT_NS
+                own = Motion(position, velocity, now_ns)
+                self._radio.lose_sight(self._sight.ends_ns(own, self._neighbors.by_node(now_ns=now_ns)))
 
     def on_sensor(self, reading: SensorReading, *, now_ns: int) -> None:
         """A UAV whose battery makes it leave gives up its place and its task at once."""

@@ -181,6 +181,9 @@ class RoutingProtocol(ABC):
     def hold(self, nodes: Collection[NodeId]) -> None:  # noqa: B027
         """The UAV flies so that these neighbors stay in reach, until it says otherwise."""
 
+    def lose_sight(self, ends_ns: Mapping[NodeId, int]) -> None:  # noqa: B027
+        """The lines of sight to these neighbors end at these instants, until the UAV says otherwise."""
+
     def least_interval_ns(self, deadline_ns: int) -> int | None:
         """The least interval between packets of this node that meets this deadline at all nodes, if it is known."""
         return None

@@ -97,7 +97,7 @@ class Node:
         self.hello_share, self.clusters = protocol.hello_share, protocol.clusters
         self.bound_ns, self.bounds = protocol.bound_ns, protocol.bounds
         self.least_interval_ns = protocol.least_interval_ns
-        self.parted, self.hold = protocol.parted, protocol.hold
+        self.parted, self.hold, self.lose_sight = protocol.parted, protocol.hold, protocol.lose_sight
         self._on_copy = None if type(protocol).on_copy is RoutingProtocol.on_copy else protocol.on_copy
         """The protocol's handler of copies; None for a protocol that ignores copies, as most receptions are copies."""
 

@@ -172,6 +172,12 @@ class Scenario(Section):
         return NodeId(self.nodes.count + 1) if self.ground.at_m else None
 
     @property
+    def buildings_cut_links(self) -> bool:
+        """True if a building between two nodes ends their link at once, whatever their distance."""
+        there = bool(self.world.buildings or self.world.buildings_geojson)
+        return there and self.radio.channel == "range" and bool(self.radio.obstruction_loss_db)
+
+    @property
     def reaches(self) -> Mapping[NodeId, float]:
         """How many times as far as UAVs nodes reach that have an antenna of their own, as in free space."""
         return {} if self.post is None else {self.post: math.pow(10.0, self.ground.gain_dbi / 20)}

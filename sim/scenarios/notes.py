@@ -202,11 +202,13 @@ def _low_ceiling(scenario: Scenario) -> Iterator[str]:
 
 def _high_roofs(scenario: Scenario) -> Iterator[str]:
     """Buildings higher than UAVs fly: they cut links at once, which bounds by distances do not foresee."""
-    world, radio, altitude_m = scenario.world, scenario.radio, scenario.nodes.altitude_m
+    world, altitude_m = scenario.world, scenario.nodes.altitude_m
     protocol = scenario.routing.protocol
     promises = protocol == "rounds" or (protocol in _CLUSTERED and scenario.clusters.relay == "scheduled")
-    if not promises or radio.channel != "range" or not radio.obstruction_loss_db or scenario.mobility.model == "static":
+    if not promises or not scenario.buildings_cut_links or scenario.mobility.model == "static":
         return
+    if protocol == "rounds" and scenario.mission.search != "none" and scenario.sensors.map_share == 1:
+        return  # UAVs foresee by their maps whom a building will hide
     if world.buildings_geojson:
         from sim.world.environment.obstacles import town_of
 

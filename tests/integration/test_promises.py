@@ -196,3 +196,20 @@ def test_nodes_that_have_not_the_time_yet_stay_out_of_the_turns_of_others() -> N
     clock = ("clock.sync=beacons", "clock.offset_ms=30", "clock.drift_ppm=15", "clusters.turn_slack_us=400")
     line = ("nodes.columns=1", "nodes.spacing_m=200", "warmup_s=0", "duration_s=40", "seed=3")
     assert summary_of(*clock, *line)["pdr"] > 0.85, ".87; they would leave .81"
+
+
+@pytest.mark.slow
+def test_bounds_hold_among_towers_that_are_on_the_map_and_break_among_those_that_are_not() -> None:
+    towers = "world.buildings=[[100,100,50,50,90],[-100,100,50,50,90],[100,-100,50,50,90],[-100,-100,50,50,90]]"
+    flight = [
+        "nodes.count=12", "nodes.spacing_m=60", "nodes.telemetry_hz=0", "radio.range_m=150", "world.area_m=700",
+        "mission.survivors=6", "mission.search=spiral", "traffic.sources=12", "traffic.interval_s=2",
+        "traffic.payload_bytes=100", "traffic.priority=report", "duration_s=40", towers,
+    ]  # fmt: skip
+    known, unknown = (
+        finish(simulate(catalog.find("rescue", [*flight, f"sensors.map_share={share}"])), out=None)["bound"]
+        for share in (1, 0)
+    )
+    assert known["violations"] == 0
+    assert known["within_share"] > 0.6
+    assert unknown["violations"] > 0, "else this shows nothing"

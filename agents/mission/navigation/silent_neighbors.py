@@ -2,7 +2,7 @@
 hover then, `neighbor_motions.py` says.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from typing import Final, Protocol
 
 from agents.mission.navigation.known_obstacles import KnownObstacles
@@ -31,6 +31,9 @@ class HeardByRadio(Protocol):
 
     def hold(self, nodes: Collection[NodeId]) -> None:
         """From now on this UAV flies so that these neighbors stay in reach, until it says otherwise."""
+
+    def lose_sight(self, ends_ns: Mapping[NodeId, int]) -> None:
+        """The lines of sight to these neighbors end at these instants, until this UAV says otherwise."""
 
 
 class SilentNeighbors:

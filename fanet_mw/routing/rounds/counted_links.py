@@ -1,9 +1,10 @@
 """Which links a bound counts on: those to neighbors that keep the same rounds, and that will stay within range.
 
 Two nodes that fly straight on lose each other when their distance exceeds the range (link expiration time; Su, Lee and
-Gerla, 2001). Those that hardly recede, whose position is not known, or that a UAV keeps in reach, are taken to stay.
-A UAV often lets go of a neighbor and holds it again at once, and news of both changes travel for seconds. For
-`_LET_GO_NS` their link must therefore last only as long as its end takes to be noticed.
+Gerla, 2001), or a building of the map comes between them. Those that hardly recede, whose position is not known, or
+that a UAV keeps in reach, are taken to stay within range. A UAV often lets go of a neighbor and holds it again at once,
+and news of both changes travel for seconds. For `_LET_GO_NS` their link must therefore last only as long as its end
+takes to be noticed.
 """
 
 from collections.abc import Iterator, Mapping
@@ -39,6 +40,8 @@ class LastingLinks:
         self._given_up = 0
         self.held = 0
         """The neighbors that this node keeps in reach by how it flies."""
+        self.sight_ends_ns: Mapping[NodeId, int] = {}
+        """When lines of sight to neighbors end behind buildings."""
         self._held_ns: dict[int, int] = {}
         """When each neighbor was kept in reach last, by its bit."""
         self.gone = 0
@@ -50,7 +53,9 @@ class LastingLinks:
 
     def among(self, near: int, own: Motion) -> int:
         """Those of a set of neighbors whose links will last, if this node flies on as it does now."""
-        lasting, self.gone = near, 0
+        until_ns = own.at_ns + self._horizon_ns
+        hidden = sum(1 << (node - 1) for node, ends_ns in self.sight_ends_ns.items() if ends_ns <= until_ns)
+        lasting, self.gone = near & ~hidden, 0
         for bit, motion, range_m in self._known(near, own):
             here = motion.offset_from(own.position, own.at_ns)
             distance_m = here.norm()

@@ -642,6 +642,10 @@ class RoundFlooding(RoutingProtocol):
         if self._lasting is not None:
             self._lasting.held = sum(1 << (node - 1) for node in nodes)
 
+    def lose_sight(self, ends_ns: Mapping[NodeId, int]) -> None:
+        if self._lasting is not None:
+            self._lasting.sight_ends_ns = ends_ns
+
     def bounds(self, priority: int) -> bool:
         return priority < PRIORITY_BULK or not self._timing.slots
 

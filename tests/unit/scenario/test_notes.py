@@ -103,11 +103,12 @@ def test_heights_that_a_ceiling_has_no_room_for_are_noted(changes: list[str], sa
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        (["world.buildings=9", "world.building_height_m=[20, 66]"], ["roofs of buildings, up to 66 m high"]),
-        (["world.buildings=9", "world.building_height_m=[20, 65]"], []),
-        (["world.buildings=[[0, 300, 9, 9, 80]]"], ["roofs of buildings, up to 80 m high"]),
-        (["world.buildings=[[0, 300, 9, 9, 80]]", "radio.obstruction_loss_db=0"], []),
-        (["world.buildings=[[0, 300, 9, 9, 80]]", "radio.channel=air_to_air"], []),
+        (["world.buildings=9", "world.building_height_m=[20, 66]", "sensors.map_share=0.9"], ["up to 66 m high"]),
+        (["world.buildings=9", "world.building_height_m=[20, 65]", "sensors.map_share=0.9"], []),
+        (["world.buildings=[[0, 300, 9, 9, 80]]", "mission.search=none"], ["up to 80 m high", "search = 'none'"]),
+        (["world.buildings=[[0, 300, 9, 9, 80]]"], []),
+        (["world.buildings=[[0, 300, 9, 9, 80]]", "sensors.map_share=0", "radio.obstruction_loss_db=0"], []),
+        (["world.buildings=[[0, 300, 9, 9, 80]]", "sensors.map_share=0", "radio.channel=air_to_air"], []),
         (["world.charge=[0.1, 0.15]", "sensors.battery_hz=1"], ["at most 0.15, not more than mission.reserve_charge"]),
         (["world.charge=[0.1, 0.2]", "sensors.battery_hz=1"], []),
         (["world.charge=[0.1, 0.1]"], []),

@@ -29,6 +29,19 @@ def test_a_link_lasts_if_both_are_in_range_for_the_horizon(at_m: float, speed_m_
     assert links.among(BIT | 1, OWN) == (BIT if lasts else 0) | 1
 
 
+@pytest.mark.parametrize(("ends_s", "lasts"), [(6, False), (6.1, True)])
+def test_a_link_lasts_only_as_long_as_its_line_of_sight_even_to_who_is_kept_in_reach(
+    ends_s: float, *, lasts: bool
+) -> None:
+    links = LastingLinks(range_m=250.0, horizon_ns=6 * S, noticed_ns=2 * S)
+    links.hear(OTHER, Motion(Enu(100.0, 0.0, 50.0), OWN.velocity, 0))
+    links.held = BIT
+    links.sight_ends_ns = {OTHER: round(ends_s * S)}
+    assert links.among(BIT | 1, OWN) == (BIT if lasts else 0) | 1
+    links.sight_ends_ns = {}
+    assert links.among(BIT | 1, OWN) == BIT | 1
+
+
 def test_a_link_that_was_given_up_counts_again_only_with_a_margin() -> None:
     links = LastingLinks(range_m=250.0, horizon_ns=6 * S, noticed_ns=2 * S)
     leaving = Motion(Enu(200.0, 0.0, 50.0), Enu(20.0, 0.0, 0.0), 0)

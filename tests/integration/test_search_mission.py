@@ -161,7 +161,7 @@ def test_a_survivor_in_the_open_is_confirmed_by_voice_alone_from_a_uav_that_goes
     assert {record.sensor for record in outcome.records if isinstance(record, Sighted)} == {"voice"}
     poses = [record for record in outcome.records if isinstance(record, Posed) and record.node == confirmed.node]
     assert min(pose.up_m for pose in poses if pose.t_ns <= confirmed.t_ns) < 25, "this one shouts louder than 88 dB"
-    assert max(pose.up_m for pose in poses if pose.t_ns > confirmed.t_ns) > 30
+    assert max(pose.up_m for pose in poses if pose.t_ns > confirmed.t_ns) > 22, "up, until it is near the next survivor"
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ so up to twice as much may fit (`fanet_mw/routing/rounds/bulk_slots.py`).
 """
 
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, Final, NamedTuple
 
 from agents.applications.traffic import sources_of
@@ -16,6 +16,7 @@ from fanet_mw.routing.rounds.delay_law import DelayLaw
 from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S
+from fanet_mw.wire import PRIORITY_REPORT
 from sim.planner.plan_text import describe_operator, item
 from sim.planner.problems_and_notes import clocks_apart
 
@@ -90,6 +91,7 @@ def judge_rounds(
             f"{bound} at the starting positions, {law.hop_ns / MS:.1f} ms for each further hop, while at most "
             f"{scenario.rounds.burst_bytes} B are under way; from {law.found_ns / S:.1f} s on, when links are known",
         ),
+        *_too_long(scenario, bound_ns),
         item("turns", f"carry {carried / 1000:.1f} kB/s of urgent packets, the traffic has {offered / 1000:.1f} kB/s"),
         item("bulk", _of_bulk(load) if timing.slots else "goes in turns, too"),
     ]
@@ -105,6 +107,13 @@ def judge_rounds(
         text.append(item("operator", operator))
         content["operator"] = operator
     return "\n".join(text), content, feasible
+
+
+def _too_long(scenario: Scenario, bound_ns: int | None) -> Iterator[str]:
+    routing, lives_ns = scenario.routing, scenario.routing.lifetime_ns(PRIORITY_REPORT)
+    if bound_ns is not None and bound_ns > lives_ns:
+        key = "report_lifetime_s" if routing.report_lifetime_s else "lifetime_s"
+        yield item("note", f"a node whose bound is longer than routing.{key} = {lives_ns / S:g} states none")
 
 
 def _of_bulk(load: BulkLoad | None) -> str:

@@ -227,6 +227,11 @@ TWELVE = ("--set", *all_send(12))
         *slow((("clusters", "--deadline", "0.5", "--json"), 1, '"clusters.flooding_period_s=')),
         (("convoy",), 0, "FEASIBLE  convoy"),
         (("rescue",), 0, "a round of"),
+        (
+            ("rescue", "--set", "traffic.sources=0", "routing.lifetime_s=4"),
+            0,
+            "longer than routing.lifetime_s = 4 states",
+        ),
         (("rescue", "--deadline", "0.5"), 1, "not within the deadline of 500 ms"),
         (("rescue", "--set", "clock.offset_ms=0.1"), 1, "rounds.turn_slack_us = 50 has to be at"),
         (("rescue", "--set", "clock.sync=gps", "clock.offset_ms=20000"), 1, "accepts no time that differs by more"),
@@ -246,6 +251,7 @@ def test_the_command_prints_its_verdict_and_ends_with_it(
         returned, out = app(["plan", *arguments], result_action="return_value"), capsys.readouterr().out
     assert returned == code, out
     assert said in out
+    assert ("lifetime_s" in out) == ("lifetime_s" in said)
     if "--json" in arguments and code != 2:
         assert json.loads(out)["superframe"]["turns"] == 375
 

@@ -29,7 +29,9 @@ _LEAD_M: Final = 120.0
 _LEASH_M: Final = 58.0
 """The greatest distance to the side at which a UAV of a team, or a relay, may be from its place."""
 _LAG_M: Final = 140.0
-"""The greatest distance by which a UAV of a team, or a relay, may be behind its place."""
+"""The greatest distance by which a UAV of a team, or a relay, may be behind its place, and on all sides of one that
+rests.
+"""
 _NEARLY_M: Final = 120.0
 """In the sweep a UAV may fly to a survivor whose estimate is this near to it and not vague."""
 _ENDS_M: Final = 200.0
@@ -229,6 +231,8 @@ class FormationPlace:
         """True if a survivor can be examined without leaving the formation; `lane` and `moves` are of `lane()`."""
         if estimate is None:
             return False
+        if moves == STILL:
+            return estimate.distance_m(lane) <= _LAG_M + self._aside_m
         ahead_m, aside_m = along(moves, estimate.east_m - lane.east, estimate.north_m - lane.north)
         return abs(aside_m) <= _LEASH_M + self._aside_m and -_LAG_M <= ahead_m <= _AHEAD_M
 
@@ -244,6 +248,8 @@ class FormationPlace:
         """True if this UAV is as near to its place as the swarm needs it to stay connected."""
         lane, moves = self.lane(now_ns)
         here = self._own_motion.position
+        if moves == STILL:
+            return lane.horizontal_to(here) <= _LAG_M
         ahead_m, aside_m = along(moves, here.east - lane.east, here.north - lane.north)
         return abs(aside_m) <= _LEASH_M and abs(ahead_m) <= _LAG_M
 
@@ -266,11 +272,10 @@ class FormationPlace:
         """How far this UAV must stay from an estimated place; 0 if it gets there, or its lane turns yet."""
         if self.is_free(now_ns) or self.pattern is None or self.pattern.dimensions.turns:
             return 0.0
+        if moves == STILL:
+            return max(0.0, estimate.distance_m(lane) - _LAG_M)
         ahead_m, aside_m = along(moves, estimate.east_m - lane.east, estimate.north_m - lane.north)
-        beyond_m = max(0.0, -_LAG_M - ahead_m)
-        if ahead_m > 0.0 and moves == STILL and not self.searches:  # a relay in the middle, which nothing brings there
-            beyond_m = ahead_m
-        return math.hypot(beyond_m, max(0.0, abs(aside_m) - _LEASH_M))
+        return math.hypot(max(0.0, -_LAG_M - ahead_m), max(0.0, abs(aside_m) - _LEASH_M))
 
     def bounded(
         self, east: float, north: float, lane: Enu, moves: Enu, now_ns: int, *, leads: bool = False
@@ -280,9 +285,15 @@ class FormationPlace:
         """
         if self.is_free(now_ns):
             return Enu(east, north, lane.up), STILL
+        if moves == STILL:  # nothing is ahead, or behind
+            left_m = math.hypot(east - lane.east, north - lane.north)
+            share = min(1.0, _LAG_M / left_m) if left_m else 1.0
+            return Enu(
+                lane.east + share * (east - lane.east), lane.north + share * (north - lane.north), lane.up
+            ), STILL
         ahead_m, aside_m = along(moves, east - lane.east, north - lane.north)
         aside_m = max(-_LEASH_M, min(_LEASH_M, aside_m))
-        most_m = _LEAD_M if leads and moves != STILL else 0.0  # a place at rest brings nobody, and has no "ahead"
+        most_m = _LEAD_M if leads else 0.0
         if ahead_m >= most_m:  # still ahead: the line will bring the UAV there
             return _beside(lane, moves, most_m, aside_m), moves
         if ahead_m < -_LAG_M:

@@ -20,7 +20,7 @@ from agents.mission.tasking.auction import Auction
 from agents.mission.tasking.voice_descent import descent_ns
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Approaching, Located
-from fanet_mw.units import Enu, NodeId, S
+from fanet_mw.units import STILL, Enu, NodeId, S
 from fanet_mw.wire.search_messages import Bid
 
 FAR_M: Final = 450.0
@@ -194,13 +194,13 @@ class Bidding:
         return formation.leads_by(place, *formation.lane(now_ns))
 
     def _may_look(self, place: Estimate | None, lane: Enu, moves: Enu) -> bool:
-        """True if a UAV of a team may go to a place without leaving the formation: to a vague one while it is ahead.
-        Who is on the way there may look around behind, too.
+        """True if a UAV of a team may go to a place without leaving the formation: to a vague one while it is ahead, or
+        the team rests. Who is on the way there may look around behind, too.
         """
         if place is None or not self._formation.leads_by(place, lane, moves):
             return False
         ahead_m, _ = along(moves, place.east_m - lane.east, place.north_m - lane.north)
-        return not place.is_vague or ahead_m > 0
+        return not place.is_vague or ahead_m > 0 or moves == STILL
 
     def _is_in_time(self, at: Enu, now_ns: int, *, after_s: float = 0.0) -> bool:
         """True if this UAV has a plan, and is at its place in time (`_LATE_S`) if it leaves a position then."""

@@ -47,11 +47,25 @@ def test_a_uav_of_a_line_stays_near_its_lane_and_a_follower_goes_anywhere() -> N
     assert line.bounded(20, 700, lane, moves, 0) == (Enu(20, 500, UP_M), moves), "ahead: the line brings it there"
     assert line.bounded(20, 560, lane, moves, 0, leads=True) == (Enu(20, 560, UP_M), STILL), "who was sent flies ahead"
     assert line.bounded(20, 700, lane, moves, 0, leads=True) == (Enu(20, 620, UP_M), moves), "by 120 m at most"
-    assert line.bounded(20, 560, lane, STILL, 0, leads=True) == (Enu(20, 500, UP_M), STILL), "north is not ahead"
+
+
+@pytest.mark.parametrize(("east_m", "north_m"), [(60, 80), (-60, 80), (60, -80), (-60, -80), (0, 100), (100, 0)])
+def test_a_place_at_rest_has_no_side_to_which_a_uav_may_not_go(east_m: float, north_m: float) -> None:
+    """North was ahead, so a line at the south edge never looked 20 m behind itself (rescue, seed 3, 155 to 197 s)."""
+    lane = Enu(0, 500, UP_M)
+    place = Board(LINE, lane).place
+    near, far = Estimate(east_m, 500 + north_m, 1, 0, 1), Estimate(2 * east_m, 500 + 2 * north_m, 1, 0, 1)
+    assert place.bounded(near.east_m, near.north_m, lane, STILL, 0) == (Enu(east_m, 500 + north_m, UP_M), STILL)
+    goal, feed = place.bounded(far.east_m, far.north_m, lane, STILL, 0)
+    assert feed == STILL
+    assert goal.minus(lane).norm() == pytest.approx(140)
+    assert (place.misses_m(near, lane, STILL, 0), place.misses_m(far, lane, STILL, 0)) == (0.0, pytest.approx(60))
+    assert place.leads_by(near, lane, STILL)
+    assert place.bounded(0, 500, lane, STILL, 0)[0] == lane
 
 
 def test_a_uav_knows_how_far_its_place_keeps_it_from_a_survivor_for_good() -> None:
-    lane, moves, middle_relay = Enu(0, 500, UP_M), Enu(0, 7.5, 0), NodeId(35)
+    lane, moves = Enu(0, 500, UP_M), Enu(0, 7.5, 0)
 
     def misses_m(node: NodeId, east_m: float, north_m: float, velocity: Enu = moves) -> float:
         return Board(node, lane).place.misses_m(Estimate(east_m, north_m, 1.0, 0.0, 1.0), lane, velocity, 0)
@@ -59,8 +73,6 @@ def test_a_uav_knows_how_far_its_place_keeps_it_from_a_survivor_for_good() -> No
     assert misses_m(LINE, 58, 900) == misses_m(LINE, -58, 360) == 0.0
     assert misses_m(LINE, 88, 320) == pytest.approx(50), "30 m beyond the leash, 40 m beyond the lag"
     assert misses_m(FOLLOWER, 300, 0) == 0.0
-    assert misses_m(LINE, 0, 520, STILL) == 0.0, "a line that waits for its turn comes back"
-    assert misses_m(middle_relay, 0, 520, STILL) == pytest.approx(20), "a relay that stands stays"
 
 
 def test_who_has_left_a_ring_for_somebody_strays_until_it_is_back_and_nobody_of_a_line_does() -> None:

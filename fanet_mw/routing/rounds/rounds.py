@@ -503,7 +503,7 @@ class RoundFlooding(RoutingProtocol):
         if self._topology.reaches(src, now_ns):
             self._spreading.assume(src, until_ns=old_ns)
         else:
-            self._topology.repeat_all()
+            self._topology.on_other_part(now_ns)
             self._hurry_changes(now_ns)
         for key in self._spreading.recent(old_ns):
             self._held[key] = None

@@ -14,6 +14,8 @@ from fanet_mw.units import NodeId, S
 from fanet_mw.wire.rounds import HeardNodes
 
 _MODULUS: Final = 256
+_MISSED: Final = 2
+"""A statement after so many that were missed comes from another part: it hurries, before the last one there expires."""
 _new: Final = tuple.__new__  # for what is made once per statement
 _REMEMBERED: Final = 4096
 """The sets of nodes whose members a process remembers; most are the neighbors of somebody, and asked for again."""
@@ -51,7 +53,7 @@ class Topology:
         self.news: dict[NodeId, None] = {}
         """The nodes of which something is to be passed on, in the order in which it was heard."""
         self._hasty: dict[NodeId, None] = {}
-        """Those of them who hear others than before, until that went ahead in a bulk slot."""
+        """Those of them of which it is new, or the first for long, until it went ahead in a bulk slot."""
         self._oldest = 0
         """The epoch of the oldest statement is this one, or a later one."""
         self._own_epoch = -1
@@ -131,8 +133,9 @@ class Topology:
         self.news[node] = None
         changed = heard if known is None else heard ^ known.told.heard
         self.changes += changed != 0 or known is None or known.told.often != often
-        if changed or known is None:
+        if changed or known is None or epoch - known.epoch > _MISSED * self._refresh:
             self._hasty[node] = None
+        if changed or known is None:
             self._relink(node, heard, changed)
 
     def _relink(self, node: NodeId, heard: int, changed: int) -> None:
@@ -175,10 +178,17 @@ class Topology:
         if self._node in self._stated:
             self.news[self._node] = None
 
-    def repeat_all(self) -> None:
-        """Tell a node of another part what all have stated; it passes on what its part does not know."""
+    def on_other_part(self, now_ns: int) -> None:
+        """A node of another part is heard: it is told what all have stated, and the link to it is stated at once unless
+        this node has stated something else in this epoch.
+        """
+        own = self._stated.get(self._node)
+        if own is None or not own.told.heard:
+            return  # as all at the start, when nobody knows yet whose slot it is
         self.news |= dict.fromkeys(self._stated)
         self._hasty |= dict.fromkeys(self._stated)
+        if own.epoch < now_ns // self._epoch_ns:
+            self.epoch_end_ns = now_ns
 
     # --- what follows from it -------------------------------------------------------------------------------------
 

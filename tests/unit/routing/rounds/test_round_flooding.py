@@ -164,6 +164,25 @@ def test_a_change_of_links_goes_in_a_bulk_slot_before_the_turn_and_in_the_turn_a
     assert not ahead[False]
 
 
+@pytest.mark.parametrize(("every", "goes_ahead"), [(4, False), (9, True)])
+def test_a_statement_after_two_that_were_missed_goes_ahead_though_it_says_the_same(
+    make_node: MakeNode, every: int, *, goes_ahead: bool
+) -> None:
+    node = make_node()
+    timing, ahead = RoundTiming.of(node.scenario), 0
+    for epoch in range(5, 5 + 20 * every):
+        at_ns = timing.turn_start_ns(OURS, from_ns=epoch * S // 4 + 100 * MS) + MS
+        run(node, at_ns)
+        hear(node, epoch, src=NEAR, at_ns=at_ns, kind=Kind.ROUND, priority=PRIORITY_CONTROL)
+        if (epoch - 5) % every:
+            continue
+        hear_of_links(node, states(9, (3, 7), epoch=epoch), at_ns=at_ns)
+        turn_ns = timing.turn_start_ns(OURS, from_ns=at_ns)
+        starts = [start_ns for start_ns, _ in stated_in(run(node, turn_ns + 1, from_ns=at_ns), 9)]
+        ahead += epoch > 5 and starts[0] < turn_ns
+    assert bool(ahead) == goes_ahead
+
+
 def test_who_comes_from_another_part_is_told_what_all_have_stated_and_who_was_in_this_part_is_not(
     make_node: MakeNode,
 ) -> None:
@@ -176,6 +195,21 @@ def test_who_comes_from_another_part_is_told_what_all_have_stated_and_who_was_in
     assert not stated_in(run(node, 1500 * MS, from_ns=1300 * MS), 9)
     hear(node, 6, src=NEW, at_ns=1500 * MS, kind=Kind.ROUND, priority=PRIORITY_CONTROL)
     assert stated_in(run(node, 1700 * MS, from_ns=1500 * MS), 9)
+
+
+def test_a_link_to_another_part_is_stated_at_once_but_nothing_else_twice_in_an_epoch(make_node: MakeNode) -> None:
+    node = make_node()
+    told = list[tuple[int, HeardNodes]]()
+    for at_ms, src in ((1_010, NEAR), (1_610, NEAR), (2_210, NEAR), (2_560, NEW), (2_570, NodeId(9))):
+        told += stated_in(run(node, at_ms * MS, from_ns=1 * S), OURS)
+        hear(node, at_ms, src=src, at_ns=at_ms * MS, kind=Kind.ROUND, priority=PRIORITY_CONTROL)
+    told += stated_in(run(node, 2_850 * MS, from_ns=2_570 * MS), OURS)
+    firsts = {one.heard.bit_count(): at_ns for at_ns, one in reversed(told)}
+    assert firsts[1] >= 1_250 * MS, "it has heard nobody yet: all meet at the start"
+    assert firsts[2] < 2_560 * MS + 50 * MS
+    assert firsts[3] >= 2_750 * MS, (
+        "it has stated another link in this epoch, and two statements of one are taken for one"
+    )
 
 
 def test_who_comes_near_is_told_of_recent_bulk(make_node: MakeNode) -> None:

@@ -236,7 +236,8 @@ def _warnings(summary: Mapping[str, Any]) -> Iterator[str]:
         yield f"NOT VALID: {reason}"
     disturbed = any(item["value"] > item["limit"] for item in summary["disturbance"].values())
     if disturbed and not summary["processes"]["ended"]:  # what came late or was lost may be the dead process's
-        yield (
-            "This machine could not hold real time. Lower the load, raise radio.lead_ms, "
-            "or let the swarm's clock slow down: fanet launch --slow-down-to 0.1"
-        )
+        slower = summary["paces"][1:]
+        advice = "let the swarm's clock slow down: fanet launch --slow-down-to 0.1"
+        if slower:  # it came too late for the first frames
+            advice = f"let the swarm's clock begin slower: fanet launch --set time_scale={slower[-1]['time_scale']:.2g}"
+        yield f"This machine could not hold real time. Lower the load, raise radio.lead_ms, or {advice}"

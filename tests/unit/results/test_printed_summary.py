@@ -79,6 +79,12 @@ def rows(*path: str, **keys: Any) -> list[str]:
     return [line for line in printed(changed) if line not in before]
 
 
+def test_who_let_the_clock_slow_down_is_not_told_to_do_so() -> None:
+    *_, advice = rows(paces=[{"time_scale": 1, "wall_s": 25}])
+    assert advice.endswith("or let the swarm's clock slow down: fanet launch --slow-down-to 0.1")
+    assert printed(EVERYTHING)[-1].endswith("or let the swarm's clock begin slower: fanet launch --set time_scale=0.4")
+
+
 def test_faults_that_parted_the_air_are_told_beside_the_share_by_distance() -> None:
     (said,) = rows("mission", connected_by_distance=0.9)
     assert said.endswith("connected by distance 90.0% of the time, 13.6% with partitions and jammed areas")
@@ -129,7 +135,7 @@ def test_all_that_there_is_to_tell_of_a_run() -> None:
         "NOT VALID: 163 frames are late",
         "NOT VALID: the world ended",
         "This machine could not hold real time. Lower the load, raise radio.lead_ms, or let the swarm's clock "
-        "slow down: fanet launch --slow-down-to 0.1",
+        "begin slower: fanet launch --set time_scale=0.4",
     ]
 
 
@@ -146,8 +152,8 @@ def test_of_a_run_in_which_nothing_happened_four_rows_are_printed(make_scenario:
     [
         ([], {"wall_s": 0.0}, ["partial, 23 of 24 s in 0.0 s (0.0 x real time)"]),
         ([], {"simulated_s": 24.0}, ["(at least 0.4): 24 s in 2.0 s"]),
-        ([], {"paces": [{"time_scale": 0.8, "wall_s": 25}]}, ["swarm clock at 0.8: partial"]),
-        ([], {"paces": [{"time_scale": 1, "wall_s": 25}]}, ["seed 22, real processes: partial"]),
+        ([], {"paces": [{"time_scale": 0.8, "wall_s": 25}], "disturbance": {}}, ["swarm clock at 0.8: partial"]),
+        ([], {"paces": [{"time_scale": 1, "wall_s": 25}], "disturbance": {}}, ["seed 22, real processes: partial"]),
         ([], {"mode": "virtual"}, ["seed 22, virtual time, swarm"]),
         ([], {"worst_nodes": [{"node": 8, "pdr": 0.9989}]}, ["worst receivers node 8 99.9%"]),
         ([], {"worst_nodes": [{"node": 8, "pdr": 0.999}]}, []),

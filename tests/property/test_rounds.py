@@ -272,3 +272,20 @@ def test_a_frame_in_its_senders_turn_shows_that_both_keep_the_same_rounds() -> N
     assert known.among(three | five | six) == three | five | six, "the other one is away"
     assert known.among(three | five | six | seven) == three, "it destroys what comes in the turn of 6, or just before"
     assert InStep(timing, certain=True).among(seven) == seven
+
+
+def test_nobody_counts_as_absent_while_news_of_ever_farther_nodes_come() -> None:
+    topology = Topology(NodeId(1), count=5, epoch_ns=250 * MS, lifetime_ns=10 * S)
+
+    def known(t_s: float) -> object:
+        return topology.absent(round(t_s * S), doubt_ns=2 * S)
+
+    topology.state(0b10, often=False, now_ns=0)
+    for hop, heard in enumerate((0b101, 0b1010, 0b100), start=1):  # of 2, 3, 4: 5 is not there
+        topology.hear([HeardNodes(NodeId(hop + 1), 0, heard, often=False)], now_ns=hop * 1500 * MS)
+        assert known(hop * 1.5) is None
+        assert known(hop * 1.5 + 1.4) is None
+    assert known(6.4) is None
+    assert known(6.5) == (5,)
+    topology.hear([HeardNodes(NodeId(3), 28, 0b10, often=False)], now_ns=7 * S)
+    assert known(7) == (4, 5), "there was a way to 4, so that nothing of it is still to come"

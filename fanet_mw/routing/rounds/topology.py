@@ -73,6 +73,8 @@ class Topology:
         """The instant at which a way was found to each node that had none before."""
         self._known = 0
         """The nodes to which there has been a way."""
+        self._grew_ns = 0
+        """When a way to a node was first found: news of nodes farther away may still be under way."""
         self._parted: Sequence[NodeId] = ()
         self._parted_for = (-1, 0)
         """The state of the links, and the nodes left out, for which the parted nodes were found."""
@@ -205,7 +207,9 @@ class Topology:
         since, away = self._unreached_ns, nodes_of(~reached & (1 << self._count) - 1)
         self._unreached_ns = {node: since.get(node, now_ns) for node in away}
         self._reached_ns.update(dict.fromkeys(since.keys() - self._unreached_ns.keys(), now_ns))
-        self._known |= reached
+        if reached & ~self._known:
+            self._known |= reached
+            self._grew_ns = now_ns
 
     def _rings_from(self, start: int, *, without: int = 0) -> Iterator[int]:
         """The nodes that are 0, 1, 2 and so on hops away from one, by ways past others."""
@@ -292,9 +296,14 @@ class Topology:
         return self._dominates
 
     def absent(self, now_ns: int, *, doubt_ns: int) -> Sequence[NodeId] | None:
-        """Nodes without a way, once had or missing for over `doubt_ns`; None while one is yet to be found."""
+        """Nodes without a way, once had or missing for over `doubt_ns` without anybody new; None while one is yet to be
+        found.
+        """
         self._arrange(now_ns)
         unreached = self._unreached_ns
-        if any(since > now_ns - doubt_ns and not self._known >> (node - 1) & 1 for node, since in unreached.items()):
+        if any(
+            max(since, self._grew_ns) > now_ns - doubt_ns and not self._known >> (node - 1) & 1
+            for node, since in unreached.items()
+        ):
             return None
         return tuple(unreached)

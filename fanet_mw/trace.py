@@ -10,6 +10,7 @@ import json
 import math
 import re
 import types
+from functools import partial
 from typing import Any, Final, NamedTuple, get_args, get_type_hints
 
 from fanet_mw.errors import MalformedFrameError
@@ -434,13 +435,17 @@ def _rows_of(kind: type[Any]) -> frozenset[tuple[type, ...]]:
 _ROWS: Final = {name: _rows_of(kind) for name, kind in _KINDS.items()}
 
 
-def _in_bounds(value: object, *, longest: int) -> bool:
+def _in_bounds(value: object, longest: int = _LONGEST_TEXT) -> bool:
     """True for a field's value that a record could hold."""
     if isinstance(value, int):
         return _LEAST_INT <= value <= _GREATEST_INT
     if isinstance(value, float):
         return math.isfinite(value)
     return not isinstance(value, str) or len(value) <= longest
+
+
+_BOUNDS: Final = {_NAMES[RadioFault]: partial(_in_bounds, longest=LONGEST_EXTENT)}
+"""What the fields of a record are checked by whose texts may be longer."""
 
 
 def kind_of(record: Record) -> str:
@@ -465,10 +470,7 @@ def parse(text: str) -> Record:
     """The record of one line; raises MalformedFrameError when the line is no record."""
     try:
         name, *fields = json.loads(text)
-        longest = LONGEST_EXTENT if name == _NAMES[RadioFault] else _LONGEST_TEXT
-        if tuple(map(type, fields)) not in _ROWS[name] or not all(
-            _in_bounds(field, longest=longest) for field in fields
-        ):
+        if tuple(map(type, fields)) not in _ROWS[name] or not all(map(_BOUNDS.get(name, _in_bounds), fields)):
             raise ValueError("fields")
         record: Record = _KINDS[name](*fields)
     except (ValueError, KeyError, TypeError, RecursionError) as error:

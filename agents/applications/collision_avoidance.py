@@ -165,7 +165,7 @@ class ConflictMonitor:
         self._fly(own)
 
     def on_course(self, course: Course) -> None:
-        self._wanted = None if course.speed_m_s == HOME else course
+        self._wanted = None if course.speed_m_s == HOME and course.velocity is None else course
 
     @property
     def avoids(self) -> bool:

@@ -5,8 +5,7 @@
 A promise is broken at each target at which a packet with a bound arrives too late, or never, if the bound was over
 before the run. It is overtaken by a fault that begins before the bound is over, and by one that has begun so lately
 that its origin need not know of it; the line of a partition and a jammed area surprise whoever flies there until they
-end.
-Packets of users' applications, whose targets the trace does not tell, are in no share.
+end. Packets of users' applications, whose targets the trace does not tell, are in no share.
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence

@@ -111,7 +111,7 @@ class ConnectivityMaintenance:
         if self._formation.is_taken_up(now_ns) or self._bidding.is_first(now_ns):
             return []
         responding = self._bidding.responders(now_ns, first=self._bidding.survivor is not None)
-        responders_at = [at for at in map(self._formation.last_seen, sorted(responding)) if at is not None]
+        responders_at = [at for at in map(self._formation.last_seen, responding) if at is not None]
         planes = []
         for node in sorted(ties):
             share = _LED if node in responding else self._share_led(ties[node], offsets[node], responders_at, now_ns)
@@ -146,7 +146,8 @@ class ConnectivityMaintenance:
         plan, pattern, place = self._formation.plan, self._formation.pattern, self._formation.place
         ties: dict[NodeId, Motion] = {}
         if plan is not None and pattern is not None and place is not None:
-            if not self._formation.is_settled(now_ns):  # links that last hold those who come late
+            is_settled = self._formation.is_settled(now_ns)
+            if not is_settled:  # links that last hold those who come late
                 ties = self._lasting(plan, pattern, place, now_ns)
             if self._formation.is_taken_up(now_ns):
                 places = self._tied_to(pattern, place, now_ns)
@@ -154,8 +155,9 @@ class ConnectivityMaintenance:
                     NodeId(plan.nodes[at]): self._neighbors.motion(plan.nodes[at], now_ns=now_ns) for at in places
                 }
                 ties |= {node: motion for node, motion in motions.items() if motion is not None}
-                if not self._formation.is_settled(now_ns):
-                    ties |= self._towards([node for node, motion in motions.items() if motion is None], now_ns)
+                late = [node for node, motion in motions.items() if motion is None]
+                if late and not is_settled:
+                    ties |= self._towards(late, now_ns)
                 if not places and pattern.kind(place) != "follower":
                     return ties  # as in a circuit, where nobody keeps in reach of others
         return (ties or self._nearest_motions(now_ns)) | self._across(now_ns)

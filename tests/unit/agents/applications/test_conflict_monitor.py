@@ -9,7 +9,7 @@ from fanet_mw.application import HOME, Course
 from fanet_mw.mavlink import Collision
 from fanet_mw.motion import Motion
 from fanet_mw.trace import ConflictForeseen, ConflictOver
-from fanet_mw.units import MS, Enu, NodeId, S
+from fanet_mw.units import MS, STILL, Enu, NodeId, S
 
 EAST, WEST = Enu(10, 0, 0), Enu(-10, 0, 0)
 OTHER = NodeId(7)
@@ -90,9 +90,11 @@ def test_a_warning_of_what_is_past_or_beyond_the_horizon_is_ignored(monitor, clo
     assert uav.course is None
 
 
-def test_a_conflict_is_over_when_the_two_have_passed_and_the_mission_goes_on(monitor) -> None:
+@pytest.mark.parametrize(
+    "goal", [Course(Enu(500, 0, 50), 10.0), Course(Enu(500, 0, 50), 0.0, STILL)], ids=["flies on", "waits in the air"]
+)
+def test_a_conflict_is_over_when_the_two_have_passed_and_the_mission_goes_on(monitor, goal) -> None:
     uav = monitor()
-    goal = Course(Enu(500, 0, 50), 10.0)
     uav.on_course(goal)
     assert not uav.avoids
     for second in range(14):

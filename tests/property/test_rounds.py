@@ -242,6 +242,33 @@ def test_who_is_beyond_a_lost_node_is_parted_before_the_links_of_that_one_are_ta
     assert topology.parted(S) == ()
 
 
+@given(st.dictionaries(st.integers(2, 12), st.sets(st.integers(1, 12)), max_size=11), st.integers(1, 10))
+def test_who_is_of_another_part_is_told_ahead_of_the_turn_what_all_have_stated(
+    states: dict[int, set[int]], frames: int
+) -> None:
+    topology = Topology(NodeId(1), count=12, epoch_ns=250 * MS, lifetime_ns=10 * S)
+    told = told_by(states, epoch=4)
+    topology.hear(told, now_ns=S)
+    topology.state(0b10, often=True, now_ns=S)
+    topology.take_news(12)
+    assert not topology.has_changes, "all is known here, and told"
+    topology.on_other_part(S)
+    ahead = [one for _ in range(frames) for one in topology.take_news(-(-12 // frames), ahead=True)]
+    assert sorted(ahead) == sorted([*told, HeardNodes(1, 4, 0b10, often=True)])
+    assert not topology.has_changes
+    assert sorted(topology.take_news(12)) == sorted(ahead), "a frame ahead of the turn may be destroyed"
+
+
+def test_a_change_that_waited_until_its_statement_expired_is_not_told() -> None:
+    topology = Topology(NodeId(1), count=3, epoch_ns=250 * MS, lifetime_ns=2 * S)
+    topology.hear(told_by({2: {3}}, epoch=4), now_ns=S)
+    assert topology.has_changes
+    topology.state(0, often=False, now_ns=4 * S)
+    assert not topology.has_changes
+    assert topology.take_news(3, ahead=True) == []
+    assert topology.take_news(3) == []
+
+
 @given(st.integers(0, 255), st.integers(300, 10_000))
 def test_a_statement_from_the_future_or_too_old_is_not_believed(short: int, epoch: int) -> None:
     topology = Topology(NodeId(1), count=3, epoch_ns=250 * MS, lifetime_ns=2 * S)

@@ -56,6 +56,16 @@ def of_two(*keys: str) -> tuple[DelayLaw, Topology]:
     return law, topology
 
 
+def test_nobody_is_left_out_of_bounds_before_hellos_of_all_could_have_come() -> None:
+    """Hellos come once per second, the first of each node at any instant of its first second."""
+    law, _ = of_two("routing.hello_interval_s=1")
+    topology = Topology(NodeId(1), count=3, epoch_ns=law.epoch_ns, lifetime_ns=10 * S)
+    topology.hear([HeardNodes(2, 0, 1, often=False)], now_ns=0)
+    topology.state(2, often=False, now_ns=0)
+    assert [law.absent(topology, now_ns=round(t_s * S)) for t_s in (0, 1.5)] == [None, None]
+    assert law.absent(topology, now_ns=3 * S) == (3,)
+
+
 def test_what_more_urgent_packets_use_of_the_turns_makes_a_bound_longer() -> None:
     law, topology = of_two()
 

@@ -43,6 +43,13 @@ def test_a_neighbor_has_flown_on_since_its_last_hello() -> None:
     assert left_s(old) == 5
 
 
+def test_who_sinks_behind_a_roof_over_which_it_was_seen_is_foreseen_from_both_ends() -> None:
+    high, sinking = (Motion(Enu(east, 0, 120), Enu(0, 0, up), HERE.at_ns) for east, up in ((-100.0, 0), (100.0, -5)))
+    assert left_s(sinking, own=high) == 7
+    assert left_s(high, own=sinking) == 7
+    assert left_s(high._replace(position=Enu(100, 0, 120)), own=high) is None, "while nobody sinks"
+
+
 place = st.builds(Enu, st.floats(-150, 150), st.floats(-150, 150), st.floats(30, 130))
 
 

@@ -2,6 +2,9 @@
 
 The node owns identity, sequence numbers, duplicate suppression, the header and the counters. The protocol decides what
 happens to a packet next, and sends through its port. Both are sans-IO: each instant is an argument.
+
+A packet may travel in several phases, told by flags of its header: flooded, carried towards a cluster head, or neither
+(`duplicates.py`). A node handles a packet once in each phase; what comes again in that phase is a duplicate.
 """
 
 from abc import ABC, abstractmethod
@@ -35,19 +38,20 @@ class Port(Protocol):
     def transmit(self, frame: bytes, dst: NodeId, start_ns: int, wants_status: bool = False, until_ns: int = 0) -> int:
         """Announce a transmission to the radio; returns the sequence number of the request.
 
-        The radio drops the frame if it cannot begin it before `until_ns`; 0 leaves that to the radio.
+        The radio drops the frame if it cannot begin it before `until_ns`; 0 leaves that to the radio. With
+        `wants_status` it reports how the transmission ended (`on_status`).
         """
 
     def transmit_together(
         self, packets: Sequence[Packet], *, flags: int, at_ns: Sequence[int], until_ns: int = 0
     ) -> None:
-        """Begin a phase of several packets: broadcast them at each of these instants, in as few frames as possible, and
-        before `until_ns` as in `transmit`. Copies that come back in that phase count as duplicates.
+        """Broadcast several packets in the phase of `flags`: at each of these instants, in as few frames as possible,
+        and before `until_ns` as in `transmit`. Copies that come back in that phase count as duplicates.
         """
 
     def transmit_to(self, packet: Packet, dst: NodeId, *, flags: int, start_ns: int) -> int:
-        """Send a packet to one neighbor, in a phase that begins here; returns the number of the request, whose status
-        will be reported. Copies that come back in that phase count as duplicates.
+        """Send a packet to one neighbor in the phase of `flags`; returns the sequence number of the request, whose
+        status will be reported. Copies that come back in that phase count as duplicates.
         """
 
     def relay(self, relay: Relay) -> None:
@@ -64,7 +68,8 @@ class Port(Protocol):
     def forwarded(self, packet: Packet, *, flags: int) -> bytes:
         """The bytes of a packet for its next hop: the hop count is one greater, and this node is the previous hop."""
 
-    def drop(self, reason: DropReason, packet: Packet, *, now_ns: int) -> None: ...
+    def drop(self, reason: DropReason, packet: Packet, *, now_ns: int) -> None:
+        """Count and record that this node gives up a packet."""
 
     def mark(self, packet: Packet, *, flags: int) -> None:
         """From now on, treat copies of a packet in the phase of these flags as duplicates."""
@@ -72,9 +77,11 @@ class Port(Protocol):
     def forget(self, packet: Packet) -> None:
         """Treat a later copy of a packet as new: this node was not to handle it yet, or has handed over its custody."""
 
-    def record(self, record: Record) -> None: ...
+    def record(self, record: Record) -> None:
+        """Put a record into the trace."""
 
-    def stream(self, use: str) -> Random: ...
+    def stream(self, use: str) -> Random:
+        """The random numbers of this node for one use, the same in each run with the same seed."""
 
 
 class RoutingProtocol(ABC):
@@ -108,7 +115,7 @@ class RoutingProtocol(ABC):
         return b""
 
     def hello_share(self, *, now_ns: int) -> float:
-        """The share of the hello interval after which the next hello should be sent."""
+        """The share of the hello interval after which the next hello is sent."""
         return 1.0
 
     def hello_start_ns(self, start_ns: int) -> int:
@@ -116,7 +123,9 @@ class RoutingProtocol(ABC):
         return start_ns
 
     def send_hello(self, packet: Packet, *, start_ns: int, wants_status: bool, now_ns: int) -> int:
-        """Transmit a hello of this node; returns the sequence number of the transmit request."""
+        """Transmit a hello of this node; returns the sequence number of the transmit request. Without `wants_status` a
+        protocol may send the hello later, in a frame with other packets, and returns -1.
+        """
         return self._port.transmit(packet.frame, BROADCAST, start_ns=start_ns, wants_status=wants_status)
 
     def first_hello_ns(self, earliest_ns: int, start_ns: int) -> int:
@@ -150,6 +159,7 @@ class RoutingProtocol(ABC):
         """The instant has come that `next_wake_ns` has named."""
 
     def next_wake_ns(self) -> int | None:
+        """The instant at which the protocol is to be woken; None if only inputs concern it."""
         return None
 
     def most_packet_bytes(self, priority: int) -> int:
@@ -163,11 +173,13 @@ class RoutingProtocol(ABC):
         return 0
 
     def bound_ns(self) -> int | None:
-        """The delay within which all nodes have the next packet of this node; None if no bound is stated."""
+        """The delay within which all nodes to which a way leads have the next packet of this node; None if no bound is
+        stated.
+        """
         return None
 
     def bounds(self, priority: int) -> bool:
-        """True if `bound_ns` is of packets of this priority, too."""
+        """True if `bound_ns` may apply to packets of this priority."""
         return True
 
     def clusters(self) -> Mapping[NodeId, tuple[NodeId, ...]]:
@@ -175,14 +187,14 @@ class RoutingProtocol(ABC):
         return {}
 
     def parted(self, now_ns: int, *, without: Collection[int] = ()) -> Collection[NodeId]:
-        """The nodes to which there was a way, and is none any more that avoids those in `without`, known to be lost."""
+        """The nodes to which there was a way, and is none any more that avoids those in `without`, which are lost."""
         return ()
 
     def hold(self, nodes: Collection[NodeId]) -> None:  # noqa: B027
-        """The UAV flies so that these neighbors stay in reach, until it says otherwise."""
+        """From now on the UAV flies so that these neighbors, and no others, stay in reach."""
 
     def lose_sight(self, ends_ns: Mapping[NodeId, int]) -> None:  # noqa: B027
-        """The lines of sight to these neighbors end at these instants, until the UAV says otherwise."""
+        """From now on lines of sight to these neighbors, and to no others, are expected to end at these instants."""
 
     def least_interval_ns(self, deadline_ns: int) -> int | None:
         """The least interval between packets of this node that meets this deadline at all nodes, if it is known."""

@@ -1,6 +1,7 @@
-"""When the line of sight to each neighbor ends: a building of the map cuts a link at once, whatever its distance.
+"""When the line of sight to each neighbor ends: a building of the map cuts a link at once, however short it is.
 
-Both fly straight on. Because they turn, buildings count as wider and higher the farther ahead an instant is.
+Both UAVs are taken to fly straight on. Because they may turn, a building counts as wider and higher the farther ahead
+an instant is.
 """
 
 import math
@@ -12,9 +13,13 @@ from fanet_mw.motion import Motion
 from fanet_mw.units import Enu, NodeId, S
 
 _AHEAD_S: Final = 10
-"""A bound looks no farther ahead than this, whatever the number of nodes."""
+"""How far ahead each line of sight is looked along. Bounds in rounds count on links for less than that in swarms of up
+to about 250 UAVs; in greater ones a building may break a bound.
+"""
 _MARGIN_M: Final = 2.0
+"""A building counts as wider on each side, and higher, by this."""
 _TURNS_M_S: Final = 1.0
+"""For an instant ahead it does so by this per second more."""
 _MOST_MARGIN_M: Final = _MARGIN_M + _TURNS_M_S * _AHEAD_S
 
 
@@ -26,11 +31,14 @@ class LinesOfSight:
         self._highest_m = max((one.roof_m for one in onboard_map.buildings), default=-math.inf)
 
     def ends_ns(self, own: Motion, neighbors: Iterable[tuple[int, Motion]]) -> dict[NodeId, int]:
-        """When each of these lines of sight ends that does so soon, in whole seconds from now."""
+        """The instants at which lines of sight to these neighbors end, rounded to whole seconds from now; without those
+        that do not end within `_AHEAD_S`.
+        """
         found = ((node, self._left_s(own, motion)) for node, motion in neighbors)
         return {NodeId(node): own.at_ns + left_s * S for node, left_s in found if left_s is not None}
 
     def _left_s(self, own: Motion, other: Motion) -> int | None:
+        """The whole seconds until a building comes between two UAVs; None if none does within `_AHEAD_S`."""
         here, there = own.position, other.position_at(own.at_ns)
         sinks_m = _AHEAD_S * max(0.0, -own.velocity.up, -other.velocity.up)
         if min(here.up, there.up) - sinks_m > self._highest_m + _MOST_MARGIN_M:
@@ -51,8 +59,8 @@ class LinesOfSight:
 
 
 def hides(building: Building, here: Enu, there: Enu, *, margin_m: float) -> bool:
-    """True if a building with a margin around it is between two places: the line between them, clipped to each pair of
-    its walls, leads below its roof.
+    """True if a building, wider and higher by a margin, is between two places: the part of the line between them that
+    lies within its walls leads below its roof.
     """
     cos, sin = math.cos(building.yaw_rad), math.sin(building.yaw_rad)
     first, last = 0.0, 1.0

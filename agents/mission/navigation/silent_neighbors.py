@@ -1,6 +1,4 @@
-"""Which neighbors are silent although they are near: their radios or programs have failed, or they fell. Where they may
-hover then, `neighbor_motions.py` says.
-"""
+"""Which neighbors are silent although they are in reach: their radios or programs have failed, or they fell."""
 
 from collections.abc import Collection, Mapping
 from typing import Final, Protocol
@@ -14,26 +12,26 @@ from fanet_mw.units import MS, NodeId
 _NEAR: Final = 0.96
 """A neighbor within this share of the radio's reach would be heard."""
 _LEAST_NS: Final = 700 * MS
-"""The shortest silence by which a neighbor counts as silent."""
+"""The least time without a frame after which a neighbor counts as silent."""
 _HIDDEN_NS: Final = 2000 * MS
 """The same where hills or buildings may hide a neighbor for a moment."""
 
 
 class HeardByRadio(Protocol):
-    """What a node knows of others beside their messages."""
+    """What the search asks its node about links, and tells it about them."""
 
     @property
     def silences(self) -> Silences:
         """How long neighbors have sent nothing."""
 
     def parted(self, now_ns: int, *, without: Collection[int] = ()) -> Collection[NodeId]:
-        """The nodes to which no way leads any more past those who are lost."""
+        """The nodes to which there was a way, and is none any more that avoids those in `without`."""
 
     def hold(self, nodes: Collection[NodeId]) -> None:
-        """From now on this UAV flies so that these neighbors stay in reach, until it says otherwise."""
+        """From now on the UAV flies so that these neighbors, and no others, stay in reach."""
 
     def lose_sight(self, ends_ns: Mapping[NodeId, int]) -> None:
-        """The lines of sight to these neighbors end at these instants, until this UAV says otherwise."""
+        """From now on lines of sight to these neighbors, and to no others, are expected to end at these instants."""
 
 
 class SilentNeighbors:
@@ -53,7 +51,7 @@ class SilentNeighbors:
         self._least_ns = _HIDDEN_NS if obstacles.hides else _LEAST_NS
 
     def parted(self, lost: Collection[int], *, now_ns: int) -> Collection[NodeId]:
-        """The UAVs that are in another part of the swarm, or gone: every way to them leads over a lost one."""
+        """The UAVs that are in another part of the swarm, or gone: no way leads to them but over lost ones."""
         return self._radio.parted(now_ns, without=lost)
 
     def has(self, node: NodeId, *, now_ns: int) -> bool:
@@ -63,7 +61,7 @@ class SilentNeighbors:
         return self._is_within(_NEAR * self._reach_m, node, now_ns)
 
     def might_be_heard(self, node: NodeId, *, now_ns: int) -> bool:
-        """True if a recent neighbor would still be in reach had it kept its velocity."""
+        """True if a neighbor of whom a motion is known would be in reach now, had it kept its velocity."""
         return self._is_within(self._reach_m, node, now_ns)
 
     def _is_within(self, metres: float, node: NodeId, now_ns: int) -> bool:

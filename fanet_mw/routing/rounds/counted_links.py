@@ -1,10 +1,10 @@
 """Which links a bound counts on: those to neighbors that keep the same rounds, and that will stay within range.
 
 Two nodes that fly straight on lose each other when their distance exceeds the range (link expiration time; Su, Lee and
-Gerla, 2001), or a building of the map comes between them. Those that hardly recede, whose position is not known, or
-that a UAV keeps in reach, are taken to stay within range. A UAV often lets go of a neighbor and holds it again at once,
-and news of both changes travel for seconds. For `_LET_GO_NS` their link must therefore last only as long as its end
-takes to be noticed.
+Gerla, 2001), or when a building of the map comes between them. A neighbor is taken to stay within range if it is there
+and hardly recedes, if its position is not known, or if this UAV flies so that it stays. A UAV often lets go of a
+neighbor and holds it again at once, and news of both changes travel for seconds. For `_LET_GO_NS` their link must
+therefore last only as long as its end takes to be noticed.
 """
 
 from collections.abc import Iterator, Mapping
@@ -17,7 +17,7 @@ from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.units import Enu, NodeId, S
 
 _RECEDING_M_S: Final = 1.0
-"""Speeds below this are errors of positioning."""
+"""A lower speed at which a neighbor recedes is taken for an error of positioning."""
 _AGAIN: Final = 1.5
 """A link that was given up counts again when it will last so many times as long."""
 _LET_GO_NS: Final = 1 * S
@@ -30,22 +30,25 @@ class LastingLinks:
     def __init__(
         self, *, range_m: float, horizon_ns: int, noticed_ns: int, reaches: Mapping[NodeId, float] = {}
     ) -> None:
-        """`horizon_ns`: how long a link must last; `noticed_ns`: after which time its end is noticed; `reaches`:
-        factors of nodes with antennas of their own.
+        """`horizon_ns`: how long a link must last; `noticed_ns`: after which time its end is noticed; `reaches`: by
+        which factor a link with each of these nodes is longer than `range_m`.
         """
         self._range_m = range_m
         self._farther_m = {node: times * range_m for node, times in reaches.items()}
         self._horizon_ns, self._noticed_ns = horizon_ns, noticed_ns
         self._motions: dict[NodeId, Motion] = {}
         self._given_up = 0
+        """The neighbors whose links did not count when this was last asked, as a set of bits."""
         self.held = 0
-        """The neighbors that this node keeps in reach by how it flies."""
+        """The neighbors that this node keeps in reach by how it flies, as a set of bits."""
         self.sight_ends_ns: Mapping[NodeId, int] = {}
-        """When lines of sight to neighbors end behind buildings."""
+        """The instants at which lines of sight to neighbors will end behind buildings."""
         self._held_ns: dict[int, int] = {}
         """When each neighbor was kept in reach last, by its bit."""
         self.gone = 0
-        """The neighbors that were out of range when this was last asked, as they flew when they were last heard."""
+        """The neighbors that were out of range when this was last asked, if they flew on as they last said; as a set of
+        bits.
+        """
 
     def hear(self, node: NodeId, motion: Motion) -> None:
         """A neighbor has told where it is."""
@@ -71,7 +74,7 @@ class LastingLinks:
         return lasting
 
     def _known(self, nodes: int, own: Motion) -> Iterator[tuple[int, Motion, float]]:
-        """Nodes whose motion is known, and each link's reach; where somebody was before it was away says nothing."""
+        """Those of a set of nodes whose motion is known from within the horizon, with the range of each link."""
         for node, motion in self._motions.items():
             bit = 1 << (node - 1)
             if nodes & bit and own.at_ns - motion.at_ns <= self._horizon_ns:
@@ -91,8 +94,8 @@ class LastingLinks:
 
 
 class InStep:
-    """Which neighbors keep this node's rounds, by when their frames of turns came. One out of step sends in others'
-    turns: no bound counts on it, nor, where it is heard, on the owners of those turns.
+    """Which neighbors keep the same rounds as this node, by when the frames of their turns came. A node out of step
+    sends in others' turns: no bound counts on it, nor, where it is heard, on the owners of those turns.
     """
 
     def __init__(self, timing: RoundTiming, *, certain: bool) -> None:
@@ -106,7 +109,7 @@ class InStep:
         """True if nobody can be out of step."""
 
     def hear(self, node: int, end_ns: int) -> None:
-        """A frame that belongs into a node's turn has ended."""
+        """A frame that a node sends in its turn has ended."""
         owner = None if self.certain else self._timing.owner(end_ns)
         if owner is None:
             return

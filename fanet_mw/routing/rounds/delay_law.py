@@ -3,12 +3,13 @@
     hop = period + turn + lead + handover
     D   = ((h + margin) * hop + (1 + used) * ceil(B / room) * period / (1 - hellos)) / (1 - urgent)
 
-`h` is the greatest distance that the node knows to another, `margin` is for a topology that changes meanwhile; `used`,
-`urgent` and `hellos` (s, u and e there) are shares of turns: of packets not less urgent, of more urgent ones, and of
-hellos. All urgent packets under way, `B` bytes, delay each other once: every node serves them at the same rate, `room`
-bytes of a frame per round (tandem of equal servers; Le Boudec and Thiran, Network Calculus, 1.4.3), the oldest first.
-What waits follows from what was heard, because all nodes hear the same packets and serve them at the same rate (a leaky
-bucket). Assumed: no frame is lost; over any channel but `range` a likely delay is stated instead (`LikelyDelay`).
+`h` is the greatest number of hops to any node to which a way is known, and `margin` hops are added for a topology that
+changes meanwhile. `used`, `urgent` and `hellos` (s, u and e there) are shares of turns: those that packets at least as
+urgent fill, those that more urgent ones fill, and those that hellos fill. Packets in turns that are under way together,
+`B` bytes (`rounds.burst_bytes`), delay each other once: every node serves them at the same rate, `room` bytes of a turn
+per round (tandem of equal servers; Le Boudec and Thiran, Network Calculus, 1.4.3), the oldest first. All nodes hear the
+same packets, so each computes the bytes that wait in the swarm from what it has heard itself (a leaky bucket). The law
+assumes that no frame is lost; where frames are lost a likely delay is stated instead (`LikelyDelay`).
 """
 
 from collections import defaultdict
@@ -26,37 +27,45 @@ from fanet_mw.wire.hello.digest import MESSAGE_BYTES
 from fanet_mw.wire.rounds import HEARD_BYTES
 
 MARGIN_HOPS: Final = 2
+"""The hops that are added to the known ones, for a topology that changes while a packet is under way."""
 PATIENT_TURNS: Final = 2
 """A hello that found no room in so many turns goes before urgent packets."""
 MOST_HOPS: Final = 32
-"""The hops for which a statement about links lives at least."""
+"""A statement about links counts for the time of so many hops after the silence by which its node would be missed."""
 _SILENT_HELLOS: Final = 1.6
+"""The hello intervals after which a node that was not heard is missed."""
 _SILENT_ROUNDS: Final = 5
+"""The rounds after which it is missed where no frames are lost, if they are shorter."""
 _SILENT_LEAST_NS: Final = 700 * MS
-"""A process may be held up for a while: a shorter silence says nothing."""
+"""The least such time: the process of a node may be held up for a while."""
 _SPEAKS: Final = 3
-"""So often at least a node sends something in the time after which it would be missed."""
+"""The number of times that a node sends something, at least, in the time after which it would be missed."""
 _MOST_USED: Final = 0.75
+"""No bound is stated while more than this share of `rounds.burst_bytes` waits."""
 _MOST_URGENT: Final = 0.5
 """No bound is stated while more urgent packets use a greater share of turns."""
 _WORSE: Final = 2
 """When the load grows, a packet waits up to so many times as long as those that were heard lately."""
 _WINDOWS: Final = 2
-"""The smoothing of the load: each window weighs one part in so many."""
+"""The usual load is smoothed: the newest window weighs one part in so many."""
 _HELLO_BYTES: Final = PLAIN_BYTES + MESSAGE_BYTES
 """The length of a hello with one message of a digest."""
 _MOST_HELLOS: Final = 1 / (1 + PATIENT_TURNS)
+"""The greatest share of turns that hellos take from packets beside which they do not fit."""
 _MOST_HELLOS_ALONE: Final = 0.9
+"""The same where each hello has a turn of its own."""
 _KEPT: Final = 0.997
-"""The share of received packets whose ratio is not exceeded; the rest of what may be missing never arrives."""
+"""The share of received packets whose ratio of delay to way is not exceeded. It is above `LIKELY_SHARE`, because some
+copies never arrive, and have no ratio.
+"""
 _FEWEST: Final = 300
-"""So many packets are received before a delay is stated."""
+"""The number of packets of others that are heard before a delay is stated."""
 _MOST: Final = 800
-"""When so many are counted, each counts half from then on."""
+"""Beyond this number of packets all counts are halved, so that older packets weigh less."""
 _STEPS: Final = 8
 """The steps into which a ratio of 1 is divided."""
 _GREATEST: Final = 16
-"""Greater ratios count as this one, and no delay is stated by it."""
+"""Ratios from about this one on are counted together, and no delay is stated by them."""
 
 
 class DelayLaw:
@@ -67,7 +76,7 @@ class DelayLaw:
         self._clock, self._slack_ns = scenario.clock, round(scenario.rounds.turn_slack_us * US)
         self.loses_frames = scenario.radio.channel != "range" or scenario.radio.fading != "none"
         self.kept_bytes = min(HEADER_BYTES + HEARD_BYTES, timing.turn_bytes // 2)
-        """The part of a turn that is kept for news of links, which urgent packets must not crowd out."""
+        """The bytes of a turn that are kept for news of links, which urgent packets must not crowd out."""
         self._room = timing.turn_bytes - self.kept_bytes
         self._burst_turns = -(-scenario.rounds.burst_bytes // self._room)
         self._burst_ns = self._burst_turns * timing.period_ns
@@ -77,37 +86,42 @@ class DelayLaw:
         hello_ns = seconds_to_ns(scenario.routing.hello_interval_s) or S
         missed_ns = round(_SILENT_HELLOS * hello_ns)
         self.found_ns = missed_ns + self.hop_ns
-        """After so long whoever is near has been heard."""
+        """The time after which a node has heard every node that is near, because each has sent a hello."""
         if not self.loses_frames:  # else several frames in a row may be lost
             missed_ns = min(missed_ns, max(_SILENT_ROUNDS * timing.period_ns, _SILENT_LEAST_NS))
         self.silent_ns = missed_ns + self.hop_ns
-        """A neighbor that was not heard for so long is none."""
+        """A node that was not heard for so long is no neighbor any more."""
         self.speaks_ns = missed_ns // _SPEAKS
         """A node that has sent nothing for so long uses its turn though it has nothing new."""
         self.epoch_ns = max(hello_ns // 4, 1)
+        """The interval at which a node may state its neighbors anew."""
         self._waiting_bytes = 0.0
+        """The bytes of packets for turns that wait in the swarm."""
         self._greatest = 0
-        """The size of the greatest of the packets that wait."""
+        """The size of the greatest of these packets [bytes]."""
         self._counted_ns = 0
+        """The instant for which `_waiting_bytes` was computed."""
         self._hellos_alone = scenario.clock.sync == "beacons"
         """Whether each hello has a turn of its own, because the clock must know its end."""
         most = _MOST_HELLOS_ALONE if self._hellos_alone else _MOST_HELLOS
         self._hello_share = min(timing.period_ns / hello_ns, most) if scenario.routing.hello_interval_s else 0.0
         self._window_ns = max(self._burst_ns, timing.period_ns)
+        """The load is measured over windows of this length."""
         self._window = 0
+        """The number of the present window."""
         self._came: defaultdict[int, float] = defaultdict(float)
         self._came_before: Mapping[int, float] = {}
         """The turns filled, by priority, by packets that came in the present window and in the one before."""
         self._usually: dict[int, float] = {}
-        """The same, smoothed over the windows so far."""
+        """The turns that packets of each priority fill in a window, smoothed over the windows before this one."""
         self._waited_ns: defaultdict[int, int] = defaultdict(int)
         self._waited_before_ns: Mapping[int, int] = {}
-        """How long a packet has waited for turns on its way, by priority, in this window and the one before."""
+        """The longest that a packet has waited for turns on its way, by priority, in this window and the one before."""
         self._stated = self._stated_turns(scenario)
         """The turns of a round that packets fill by the scenario, by priority."""
 
     def count(self, size: int, *, priority: int, now_ns: int) -> None:
-        """A packet for turns came, own or another node's."""
+        """A packet for turns was made here, or received."""
         self._turn_window(now_ns)
         self._came[priority] += self.turns_of(size)
         self._serve(now_ns)
@@ -124,7 +138,7 @@ class DelayLaw:
         return max((waited_ns for other, waited_ns in waits if other <= priority), default=0)
 
     def _serve(self, now_ns: int) -> None:
-        """Each round has carried a turn's worth of what waited."""
+        """Take off the waiting bytes what the rounds since `_counted_ns` have carried: one turn's worth each."""
         left = 1 - self._hellos(self._greatest)
         served = left * self._sure_bytes * (now_ns - self._counted_ns) / self._timing.period_ns
         self._waiting_bytes -= served
@@ -134,11 +148,11 @@ class DelayLaw:
 
     @property
     def _sure_bytes(self) -> int:
-        """What a turn carries at least of packets that wait: none is divided, so its end may be empty."""
+        """The least bytes of waiting packets that a full turn carries: none is divided, so its end may be empty."""
         return max(1, self._room - self._greatest + 1)
 
     def _hellos(self, size: int) -> float:
-        """The share of turns that hellos take from packets of a size."""
+        """The share of turns that hellos take from packets of `size` bytes."""
         beside = not self._hellos_alone and _HELLO_BYTES + size <= self._timing.turn_bytes
         return self._hello_share * (_HELLO_BYTES / self._timing.turn_bytes if beside else 1)
 
@@ -166,7 +180,9 @@ class DelayLaw:
         return max(before, (1 - passed) * before + came) / (self._window_ns / self._timing.period_ns)
 
     def _used_share(self, priority: int) -> float:
-        """The share of turns of packets not less urgent, as a rule, or by the scenario if that is more."""
+        """The share of turns that packets at least as urgent as `priority` fill: usually, or by the scenario if that is
+        more.
+        """
         used = sum(turns for other, turns in self._usually.items() if other <= priority)
         stated = sum(turns for other, turns in self._stated.items() if other <= priority)
         return max(used * self._timing.period_ns / self._window_ns, stated)
@@ -206,11 +222,13 @@ class DelayLaw:
         return round(found_ns / (1 - urgent))
 
     def over_ns(self, hops: int, *, longest_bytes: int, used: float = 0.0) -> int:
-        """The bound over hops if nothing more urgent comes; `used`: share of turns, none by over `longest_bytes`."""
+        """The bound over so many hops if nothing more urgent comes, and no packet under way exceeds `longest_bytes`;
+        `used`: the share of turns that packets at least as urgent fill.
+        """
         return self.way_ns(hops) + round((1 + used) * self._burst_ns / (1 - self._hellos(longest_bytes)))
 
     def turns_of(self, size: int) -> float:
-        """The turns that a packet fills, beside hellos and others of its size."""
+        """The turns that a packet of `size` bytes fills, if it shares them with hellos and packets of the same size."""
         return 1 / max(1, self._room // size) / (1 - self._hellos(size))
 
     def way_ns(self, hops: int) -> int:
@@ -223,9 +241,9 @@ class DelayLaw:
 
 
 class LikelyDelay:
-    """The delay within which most copies of a node's packets arrive where links lose frames: rounds to the farthest
-    node, two hops added, x the ratio that few packets of others have exceeded lately. Links are as lossy one way as the
-    other, so packets take as long to the others as from them.
+    """The delay within which nearly all copies of a node's packets arrive: the time that the way to the farthest node
+    takes if nothing is lost and nothing waits, x the ratio of delay to such a time that few packets of others have
+    exceeded lately. Assumed: packets take as long to the others as from them.
     """
 
     def __init__(self) -> None:

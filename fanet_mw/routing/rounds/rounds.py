@@ -1,13 +1,16 @@
-"""Rounds: a protocol whose delays do not depend on the topology. Each node has one turn in every round, by its number.
+"""Rounds: a protocol whose delay per hop does not depend on the topology. Each node has one turn in every round, by its
+id; the rest of the round is divided into slots.
 
-    urgent packet   waits for the own turn; whoever hears it first sends it in the own next turn (`spreading.py`: which
+    urgent packet   goes in the next turn of its origin, and of each node that receives it for the first time; also in a
+                    slot of that node that comes sooner, and a warning at once between turns (`spreading.py`: which
                     packet goes first, and who passes it on)
-    bulk for all    goes in slots of the rest of the round, as long as a neighbor is not known to have it
+    bulk for all    goes in slots (`bulk_slots.py`: whose they are), while a neighbor is not known to have it
     bulk for one    goes hop by hop between the turns, acknowledged (`one_way.py`)
     topology        each node states its neighbors when they change, and all pass that on in turns (`topology.py`)
     hello           goes in a turn; holds a digest, so that neighbors send what was missed (`Repair`)
 
-One hop takes at most one round, one turn, the lead and the handover, whatever moves (`delay_law.py`).
+One hop takes at most one round, one turn, the lead and the handover, whatever moves, and one round more where hellos
+have turns of their own (`delay_law.py`).
 """
 
 from collections import OrderedDict
@@ -53,19 +56,25 @@ _ROUND: Final = int(Kind.ROUND)
 _STORE_PACKETS: Final = 4096
 """The most packets that a node keeps for repair."""
 _MOST_HELD: Final = 512
+"""The most packets of which neighbors wait to be told that this node holds them."""
 _MOST_TOLD: Final = 4096
+"""The most packets of which a node remembers when neighbors were last told of them."""
 _SPARE_HOPS: Final = 2
 """The hops for which a node that is not in the dominating set waits for others to send a new bulk packet."""
 _MOST_ROUNDS: Final = 8
 """The rounds that a node lets pass at most before it repeats bulk once more."""
 _FLOOD_HOPS: Final = 4
-"""A node that comes near has got elsewhere what is older than so many hops."""
+"""A node that comes near is taken to have received from others what is older than the time of so many hops."""
 _LASTING_HOPS: Final = 8
-"""A link counts if it lasts until its end would be noticed, and a packet has gone so many hops after that."""
+"""A link counts if it lasts until its end would be noticed, and for the time of so many hops after that."""
 _MUCH_BULK: Final = 4
-"""A node that is to send so many bulk packets before others takes part in all bulk slots until they are sent."""
+"""A node takes part in all bulk slots from when so many bulk packets wait that are not left to others until none
+does.
+"""
 _OTHERS_LATER: Final = 1.75
-"""Bulk may reach some other node so many times later than this one, which may lie better."""
+"""The likely delay of own bulk is this multiple of that of others' bulk at this node, because bulk may reach some other
+node later.
+"""
 _SPREAD_SLOTS: Final = 1.0
 """Neighbors that pass on the same warning start within so many slots."""
 _FALLS_M_S: Final = 12.0
@@ -75,11 +84,12 @@ _BEFORE_TURN_NS: Final = 1 * US
 
 
 class _Told(NamedTuple):
-    """What a neighbor tells in its turn."""
+    """What a neighbor tells in one packet."""
 
     held: Sequence[int]
     """The packets that it holds, by their keys."""
     heard: Sequence[HeardNodes]
+    """What nodes have stated about their neighbors."""
 
 
 def _told_in(content: Content) -> _Told:
@@ -141,29 +151,35 @@ class RoundFlooding(RoutingProtocol):
         self._often = False
         """Whether this node takes part in all bulk slots, as it has stated."""
         self._slot_ns: int | None = None
+        """The own bulk slot that is used next; None while nothing waits for one."""
         self._slot_from_ns = 0
+        """The instant from which on it was sought."""
         self._slot_by: tuple[int, int, bool] | None = None
         """The neighbors, the state of the topology, and the part in slots, by which it was found."""
         self._gone = 0
-        """The neighbors that have left, though they were heard lately."""
+        """The neighbors that are out of range by their last hello, though they were heard lately, as a set of bits."""
         self._held: dict[int, None] = {}
         """Packets of which a neighbor should be told that this node holds them, by key."""
         self._told_ns = OrderedDict[int, int]()
         """When neighbors were last told of each packet, the latest last."""
         self._hello: Packet | None = None
+        """The hello that waits for the own turn."""
         self._hello_waits = 0
         """The number of turns in which the hello found no room."""
         self._near = 0
         """The nodes that were heard lately, as a set of bits (`topology.nodes_of`)."""
         self._near_until_ns = 0
+        """The instant at which the first of them will have been silent for too long."""
         self._turn_ns = 0
         """The next own turn that may still be filled."""
         self._turn_asked = False
-        """Whether something waited for it when it could still be announced in time."""
+        """Whether this node has asked to be woken for that turn, because something waits for it."""
         self._speaks_ns = 0
         """The own turn that is used even if there is nothing new to say, because this node would be missed."""
         self._stated = 0
+        """The number of bounds that were stated."""
         self._now_ns = 0
+        """The instant at which this node was woken last."""
 
     def start(self, now_ns: int) -> None:
         self._topology.state(0, often=False, now_ns=now_ns)
@@ -259,13 +275,13 @@ class RoundFlooding(RoutingProtocol):
             self._exclude(absent, packet)
 
     def _exclude(self, nodes: Iterable[NodeId], packet: Packet) -> None:
-        """What was stated of an own packet is not meant for these nodes."""
+        """Record that the bound, or the likely delay, of an own packet does not apply to these nodes."""
         header = packet.header
         for node in nodes:
             self._port.record(BoundExcludes(header.origin_us * US, self._port.node, header.seq, node))
 
     def _compare(self, packet: Packet, now_ns: int) -> None:
-        """How long a packet of another node took shows how long the own ones may take."""
+        """Learn from the delay of another node's packet how long own packets may take."""
         origin = NodeId(packet.header.origin)
         delay_ns = now_ns + self._handover_ns - packet.header.origin_us * US
         likely, hops = self._likely, self._topology.hops_to(origin, now_ns)
@@ -278,7 +294,7 @@ class RoundFlooding(RoutingProtocol):
             likely.hear(delay_ns, way_ns=self._law.way_ns(hops))
 
     def _in_turns(self, packet: Packet) -> bool:
-        """True for a packet that travels in turns; bulk does only where no window is left to it."""
+        """True for a packet that travels in turns: any but bulk, and bulk if rounds have no slots for it."""
         return self.bounds(packet.header.priority)
 
     def _hold(self, packet: Packet, now_ns: int) -> None:
@@ -308,7 +324,7 @@ class RoundFlooding(RoutingProtocol):
 
     def _send_at_once(self, packet: Packet, now_ns: int) -> None:
         """A warning contends between the turns, whoever owns the slot, and goes in the turn as well. One made during
-        turns begins at random after their end, because all that wait would begin there at once, with bulk.
+        turns begins at random after their end, because all that wait for this end would begin there at once.
         """
         spread_ns = int(self._random() * _SPREAD_SLOTS * self._timing.slot_ns)
         wanted_ns = now_ns + self._lead_ns + spread_ns
@@ -319,8 +335,8 @@ class RoundFlooding(RoutingProtocol):
             self._port.transmit_together([packet], flags=FLAG_FLOOD, at_ns=(start_ns,))
 
     def _reach_turn(self, now_ns: int) -> None:
-        """Something waits: fill the next turn that can be announced in time. One for which the node has asked to be
-        woken stays, because a process is woken up to half a lead late.
+        """Something waits: fill the next turn that can be announced in time. A turn for which the node has asked to be
+        woken is kept while half a lead is left, because a process may be woken that late.
         """
         asked = self._turn_asked and now_ns <= self._turn_ns - self._lead_ns // 2
         if self._turn_ns < now_ns + self._lead_ns and not asked:
@@ -328,7 +344,9 @@ class RoundFlooding(RoutingProtocol):
         self._turn_asked = True
 
     def _use_turn(self, turn_ns: int, now_ns: int) -> None:
-        """Announce the frame of a turn: urgent packets, what neighbors are told, then the hello, as they fit."""
+        """Announce the frame of a turn: urgent packets, what neighbors are told, then the hello, as they fit; a hello
+        that has found no room for long goes first.
+        """
         room, together = self._timing.turn_bytes, list[Packet]()
         hello = self._hello
         if hello is not None and self._hello_waits >= PATIENT_TURNS:
@@ -377,8 +395,8 @@ class RoundFlooding(RoutingProtocol):
         return at_ns - header.origin_us * US > self._lifetimes_ns[header.priority]
 
     def _told(self, room: int, now_ns: int, *, ahead: bool = False) -> Packet | None:
-        """What this node tells its neighbors of links and held packets, if there is anything and room for it; `ahead`
-        of its turn: of changed links alone.
+        """A packet that tells the neighbors of links and of held packets; None if there is nothing, or no room.
+        `ahead` of the turn: of changed links alone.
         """
         room -= HEADER_BYTES
         inner = b""
@@ -414,7 +432,7 @@ class RoundFlooding(RoutingProtocol):
             self._hurry_changes(now_ns)
 
     def _hurry_changes(self, now_ns: int) -> None:
-        """What has changed about links goes in a bulk slot if one comes before the turn."""
+        """Use the next own bulk slot for changes of links, if one comes before the turn."""
         if self._timing.slots and self._topology.has_changes:
             self._reach_slot(now_ns, now_ns)
 
@@ -518,8 +536,8 @@ class RoundFlooding(RoutingProtocol):
         return self._near
 
     def _stayers(self, now_ns: int) -> int:
-        """The neighbors with which this node has links that will last; none while it falls, so that bounds do not count
-        on it when its radio ends on the ground.
+        """The neighbors that keep this node's rounds, and with which it has links that will last. While it falls it has
+        none, so that no bound counts on it when its radio ends on the ground.
         """
         if self._port.velocity.up <= -_FALLS_M_S:
             return 0
@@ -547,7 +565,7 @@ class RoundFlooding(RoutingProtocol):
         return self._repair.digest(most=capacity(room), now_ns=now_ns).encode_frames(self._port.node)
 
     def send_hello(self, packet: Packet, *, start_ns: int, wants_status: bool, now_ns: int) -> int:
-        """Put the hello into the turn; one whose end the clock must know goes in a frame of its own."""
+        """Put the hello into the frame of the turn; one whose end the clock must know has that turn alone."""
         turn_ns = self._timing.turn_start_ns(self._port.node, from_ns=start_ns)
         if not wants_status:
             self._hello = packet

@@ -1,7 +1,8 @@
-"""Who hears whom in the whole swarm: each node states its neighbors, and all pass that on in turns.
+"""Who hears whom in the whole swarm: each node states its neighbors, and all pass that on.
 
 A statement bears the number of its epoch, a short interval of swarm time, so a newer one is known whoever passes it on.
-A node states changes at the beginning of an epoch, and all once per second. A link counts if both its ends state it.
+A node states its neighbors when they change, once in an epoch at most, and once per second in any case. A link counts
+if both its ends state it.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -14,9 +15,12 @@ from fanet_mw.units import NodeId, S
 from fanet_mw.wire.rounds import HeardNodes
 
 _MODULUS: Final = 256
+"""On the air epochs are counted modulo this."""
 _MISSED: Final = 2
-"""A statement after so many that were missed comes from another part: it hurries, before the last one there expires."""
-_new: Final = tuple.__new__  # for what is made once per statement
+"""A node of which more than so many statements have not come is taken to return from another part of the swarm. Its
+next one goes ahead in a bulk slot, because the one that others still have may expire soon.
+"""
+_new: Final = tuple.__new__  # makes a `_Stated` faster, as is done once per statement
 _REMEMBERED: Final = 4096
 """The sets of nodes whose members a process remembers; most are the neighbors of somebody, and asked for again."""
 
@@ -33,6 +37,8 @@ def nodes_of(bits: int) -> tuple[NodeId, ...]:
 
 
 class _Stated(NamedTuple):
+    """The newest known statement of a node."""
+
     epoch: int
     told: HeardNodes
     """What was stated, as it is passed on."""
@@ -45,28 +51,31 @@ class Topology:
         self._node = node
         self._count = count
         self._epoch_ns = epoch_ns
-        self._lifetime = min(_MODULUS // 2, -(-lifetime_ns // epoch_ns))
-        self._refresh = max(1, S // epoch_ns)
+        self._lifetime_epochs = min(_MODULUS // 2, -(-lifetime_ns // epoch_ns))
+        """A statement that is older is forgotten."""
+        self._refresh_epochs = max(1, S // epoch_ns)
+        """A node repeats a statement that has not changed after so many epochs."""
         self._stated: dict[NodeId, _Stated] = {}
         self.links = [0] * (count + 1)
         """The nodes with which each node has links, by its id; the first entry is of no node."""
         self.news: dict[NodeId, None] = {}
-        """The nodes of which something is to be passed on, in the order in which it was heard."""
+        """The nodes whose statements are to be passed on, in the order in which these came."""
         self._hasty: dict[NodeId, None] = {}
-        """Those of them of which it is new, or the first for long, until it went ahead in a bulk slot."""
+        """Those of them whose statement is to go ahead in a bulk slot, as a change, or as the first for long."""
         self._oldest = 0
-        """The epoch of the oldest statement is this one, or a later one."""
-        self._own_epoch = -1
+        """No known statement is of an earlier epoch than this one."""
         self.epoch_end_ns = 0
+        """The instant at which this node states its neighbors next."""
         self._rings: list[int] = []
-        """The nodes that are so many hops away."""
+        """The nodes that are 0, 1, 2 and so on hops away."""
         self._hops: dict[NodeId, int] = {}
         """The hops to each node to which a way is known; empty until somebody asks."""
         self._dominates = True
+        """Whether this node is in the dominating set."""
         self._dominates_for: Sequence[int] = ()
-        """The links of this node and its neighbors for which it decided whether it is in the dominating set."""
+        """The links of this node and of its neighbors for which that was decided."""
         self._dominates_at = -1
-        """The state of the links at which it last looked whether these have changed."""
+        """The value of `_link_changes` at which these links were compared last."""
         self._unreached_ns: dict[NodeId, int] = {}
         """The instant since which each node without a way is known to have none."""
         self._reached_ns: dict[NodeId, int] = {}
@@ -74,31 +83,38 @@ class Topology:
         self._known = 0
         """The nodes to which there has been a way."""
         self._grew_ns = 0
-        """When a way to a node was first found: news of nodes farther away may still be under way."""
+        """The latest instant at which a way to some node was found for the first time. Statements of nodes farther away
+        may still be under way.
+        """
         self._parted: Sequence[NodeId] = ()
+        """What `parted` has returned last."""
         self._parted_for = (-1, 0)
-        """The state of the links, and the nodes left out, for which the parted nodes were found."""
+        """The value of `_link_changes`, and the nodes left out, for which that was found."""
         self._rivals: list[tuple[NodeId, bool]] = []
+        """What `rivals` has returned last."""
         self._rivals_for: tuple[int, int] | None = None
-        """The neighbors, and the state of what is known, for which the rivals were found."""
+        """The neighbors, and the value of `changes`, for which that was found."""
         self._nearer: dict[NodeId, int] = {}
-        """The nodes next to this one that are nearer to each destination."""
+        """What `nearer` has returned for each destination."""
         self._nearer_for = -1
-        """The state of the links for which they were found."""
+        """The value of `_link_changes` for which that was found."""
         self.changes = 0
-        """How often links, or who takes part in bulk slots often, have changed."""
+        """How often statements have changed in whom a node hears, or in whether it takes part in bulk slots often."""
         self._link_changes = 0
+        """How often a link has come or gone that both its ends have stated."""
         self._arranged_for = -1
-        """The state of the links for which the rings were computed."""
+        """The value of `_link_changes` for which the rings were computed."""
 
     # --- what is stated -------------------------------------------------------------------------------------------
 
     def state(self, heard: int, *, often: bool, now_ns: int) -> None:
-        """An epoch has begun in which this node hears these neighbors, and takes part in bulk slots often or not."""
-        self._own_epoch = epoch = now_ns // self._epoch_ns
+        """State that this node hears these neighbors, and takes part in bulk slots often or not, if that is new or due
+        again; forget what others have not repeated.
+        """
+        epoch = now_ns // self._epoch_ns
         self.epoch_end_ns = (epoch + 1) * self._epoch_ns
-        if self._oldest < epoch - self._lifetime:
-            for node in [n for n, one in self._stated.items() if one.epoch < epoch - self._lifetime]:
+        if self._oldest < epoch - self._lifetime_epochs:
+            for node in [n for n, one in self._stated.items() if one.epoch < epoch - self._lifetime_epochs]:
                 self._forget(node)
             self._oldest = min((one.epoch for one in self._stated.values()), default=epoch)
         self._arrange(now_ns)
@@ -108,7 +124,7 @@ class Topology:
         if (
             known is None
             or (known.told.heard, known.told.often) != (heard, often)
-            or self._own_epoch - known.epoch >= self._refresh
+            or epoch - known.epoch >= self._refresh_epochs
         ):
             self._note(epoch, HeardNodes(self._node, epoch % _MODULUS, heard, often))
 
@@ -122,7 +138,7 @@ class Topology:
             if known is not None and known.told.epoch == short:
                 continue
             behind = (current + 1 - short) % _MODULUS - 1  # one epoch ahead is possible, because clocks differ
-            if node == self._node or node > self._count or behind > self._lifetime or heard >> self._count:
+            if node == self._node or node > self._count or behind > self._lifetime_epochs or heard >> self._count:
                 continue
             if known is None or current - behind > known.epoch:
                 self._note(current - behind, one)
@@ -135,13 +151,13 @@ class Topology:
         self.news[node] = None
         changed = heard if known is None else heard ^ known.told.heard
         self.changes += changed != 0 or known is None or known.told.often != often
-        if changed or known is None or epoch - known.epoch > _MISSED * self._refresh:
+        if changed or known is None or epoch - known.epoch > _MISSED * self._refresh_epochs:
             self._hasty[node] = None
         if changed or known is None:
             self._relink(node, heard, changed)
 
     def _relink(self, node: NodeId, heard: int, changed: int) -> None:
-        """A node hears some others now, or no longer."""
+        """A node states that it hears `heard` now; `changed`: those of whom it has stated something else before."""
         own, links = 1 << (node - 1), self.links
         before = links[node]
         for other in nodes_of(changed):
@@ -162,7 +178,9 @@ class Topology:
         self._relink(node, 0, heard)
 
     def take_news(self, most: int, *, ahead: bool = False) -> list[HeardNodes]:
-        """`ahead`: changes alone, which stay news, because a frame in a bulk slot may be destroyed."""
+        """At most so many statements to pass on, which are news no longer. `ahead` of the turn: changes alone, which
+        stay news, because a frame in a bulk slot may be destroyed.
+        """
         nodes = list(self._hasty if ahead else self.news)[:most]
         for node in nodes:
             self._hasty.pop(node, None)
@@ -172,7 +190,7 @@ class Topology:
 
     @property
     def has_changes(self) -> bool:
-        """True while changes are to be passed on in a bulk slot."""
+        """True while statements are to go ahead in a bulk slot."""
         return bool(self._hasty)
 
     def repeat(self) -> None:
@@ -212,7 +230,7 @@ class Topology:
             self._grew_ns = now_ns
 
     def _rings_from(self, start: int, *, without: int = 0) -> Iterator[int]:
-        """The nodes that are 0, 1, 2 and so on hops away from one, by ways past others."""
+        """The nodes that are 0, 1, 2 and so on hops away from `start`, on ways that avoid those in `without`."""
         ring = reached = 1 << (start - 1)
         while ring:
             yield ring
@@ -262,7 +280,9 @@ class Topology:
         return node not in self._unreached_ns
 
     def parted(self, now_ns: int, *, without: Collection[int] = ()) -> Sequence[NodeId]:
-        """Nodes to which there was a way, and is none past those in `without`, lost ones still stated as near."""
+        """The nodes to which there was a way, and is none any more that avoids those in `without`; others may state a
+        lost node as a neighbor for a while.
+        """
         self._arrange(now_ns)
         passed = sum(1 << (node - 1) for node in without)
         if self._parted_for != (self._link_changes, passed):
@@ -272,16 +292,16 @@ class Topology:
         return self._parted
 
     def rivals(self, near: int) -> list[tuple[NodeId, bool]]:
-        """The nodes within two hops, if this node hears `near`, and whether each takes part in bulk slots often."""
+        """The nodes within two hops, if this node hears `near`, and whether each takes part in bulk slots often, as one
+        that has stated nothing is taken to.
+        """
         if self._rivals_for != (near, self.changes):
             self._rivals_for = near, self.changes
             reached = near | self._around(near)
             stated = self._stated
             others = nodes_of(reached & ~(1 << (self._node - 1)))
             found = [(node, node not in stated or stated[node].told.often) for node in others]
-            self._rivals = sorted(
-                found, key=lambda rival: not rival[1]
-            )  # those that take part in each slot decide soonest
+            self._rivals = sorted(found, key=lambda rival: not rival[1])  # the likeliest owners of a slot come first
         return self._rivals
 
     def dominates(self) -> bool:
@@ -296,8 +316,8 @@ class Topology:
         return self._dominates
 
     def absent(self, now_ns: int, *, doubt_ns: int) -> Sequence[NodeId] | None:
-        """Nodes without a way, once had or missing for over `doubt_ns` without anybody new; None while one is yet to be
-        found.
+        """The nodes to which no way leads. None while one of them has never been reached, and `doubt_ns` have not
+        passed since the start and since a way to any node was found for the first time.
         """
         self._arrange(now_ns)
         unreached = self._unreached_ns

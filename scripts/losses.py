@@ -55,7 +55,7 @@ from sim.results.bounds import UNNOTICED_NS  # noqa: E402
 from sim.results.clocks import true_delays  # noqa: E402
 from sim.results.files import finish  # noqa: E402
 from sim.results.links_over_time import parts  # noqa: E402
-from sim.results.mission import Confirmations, OverflownCells  # noqa: E402
+from sim.results.mission import Confirmations, CoveredCells  # noqa: E402
 from sim.results.outcome import Outcome  # noqa: E402
 from sim.run.virtual import (  # noqa: E402
     GARBAGE,
@@ -200,7 +200,7 @@ class Flight:
 
     def curve(self, losses: Sequence[Loss], every_s: float, torn: Sequence[tuple[int, bool]]) -> list[list[float]]:
         """What is left so long after each loss: lost, connected since the one before, covered, found."""
-        cells, rows, seen_ns = OverflownCells(self.scenario), list[list[float]](), -S
+        cells, rows, seen_ns = CoveredCells(self.scenario), list[list[float]](), -S
         found = Confirmations(place(self.scenario))
         news = iter([*records_of(self._records, Confirmed, Refuted)])
         waiting, ends = next(news, None), [(loss.at_ns, loss.at_ns + round(every_s * S)) for loss in losses]

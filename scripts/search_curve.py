@@ -27,7 +27,7 @@ from fanet_mw.scenario import Scenario  # noqa: E402
 from fanet_mw.units import Enu, S  # noqa: E402
 from sim.figures.colors import BLUE, GRAY, ORANGE, RED  # noqa: E402
 from sim.figures.style import applied, canvas  # noqa: E402
-from sim.results.mission import OverflownCells  # noqa: E402
+from sim.results.mission import CoveredCells  # noqa: E402
 from sim.scenarios import catalog  # noqa: E402
 from sim.world.environment.layout import positions  # noqa: E402
 
@@ -58,7 +58,7 @@ def way_s(made: Scenario, pattern: Pattern) -> float:
 
 def covered_95_s(made: Scenario, pattern: Pattern) -> float:
     """The time of the sweep until 95 % of the area were within the range of a receiver."""
-    cells, swept_s = OverflownCells(made), 0.0
+    cells, swept_s = CoveredCells(made), 0.0
     while cells.share < 0.95:
         cells.add(pattern.at(place, swept_s) for place in range(pattern.places))
         swept_s += STEP_S

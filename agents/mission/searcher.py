@@ -1,7 +1,7 @@
 """The planned search at one UAV: it keeps its lane, reports phones, bids for survivors, responds, and confirms.
 
-It wires the parts together; docs/explanation/search.md says who decides what. All that a UAV knows it has sensed itself
-or received over the air. At each position fix it chooses a velocity (`flight`).
+This file wires the parts of a search together; docs/explanation/search.md says which part decides what. All that a UAV
+knows beside the scenario and its map it has sensed itself, or received over the air.
 """
 
 import math
@@ -34,11 +34,11 @@ from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.navigation.silent_neighbors import HeardByRadio, SilentNeighbors
 from agents.mission.orders import KnownOrders, record_of
 from agents.mission.outbox import Outbox
-from agents.mission.search_formation.formation_place import FormationPlace
 from agents.mission.search_formation.formation_planner import NOTICE_IN_ROUNDS_NS, NOTICE_NS, FormationPlanner
 from agents.mission.search_formation.pattern import Pattern, fastest, fitted, of_few
 from agents.mission.search_formation.plan_exchange import PlanExchange
 from agents.mission.search_formation.roll_call import RollCall
+from agents.mission.search_formation.search_place import SearchPlace
 from agents.mission.search_formation.shapes.contract import Demands, ShapeName
 from agents.mission.tasking.absence import Absence
 from agents.mission.tasking.approach import Approach
@@ -71,16 +71,17 @@ _MOST_DECADES: Final = 12.0
 _OFFSET_DB: Final = 1.0
 """The standard deviation that is assumed for the difference between one phone's power and the mean of all phones."""
 _REVIEW_NS: Final = 1 * S
+"""The interval at which a UAV decides all that does not need an answer at once (`Searcher.wake`)."""
 _SIGHT_NS: Final = 500 * MS
-"""The interval at which it is found to whom the line of sight ends."""
+"""The interval at which a UAV computes when its lines of sight end."""
 _ROLL_NS: Final = 200 * MS
-"""The interval at which it is found who is lost."""
+"""The interval at which a UAV decides which others are lost."""
 _LEAST_RECOGNIZED: Final = 0.1
 """The least share of the people in an image that a camera must recognize from the height of the search."""
 _LOOKED_NS: Final = 10 * S
 """How long a UAV looks for a survivor before the verdict that the survivor is inside a building."""
 _DOUBTED_NS: Final = 45 * S
-"""How long it waits until it is clear in which building."""
+"""How long it looks for a survivor who may be in one of several buildings, before it states a place amid them."""
 _DEPLOY: Final = 0.9
 """The share of its greatest speed at which the slowest UAV flies to its first place."""
 
@@ -111,7 +112,7 @@ class Searcher:
         aside_m, ahead_m = _view_m(scenario)
         around = mission.search in ("ring", "fan")  # lanes lead east and west as well
         look_m = min(aside_m, ahead_m) if around else aside_m
-        self._place = place = FormationPlace(node, own_motion, reach_m=reach_m, look_m=look_m)
+        self._place = place = SearchPlace(node, own_motion, reach_m=reach_m, look_m=look_m)
         least_m_s, _ = mission.approach_speeds_m_s
         nodes = scenario.nodes
         silent = None if radio is None else SilentNeighbors(radio, neighbors, own_motion, obstacles, reach_m=reach_m)
@@ -287,7 +288,7 @@ class Searcher:
                 self._radio.lose_sight(self._sight.ends_ns(own, self._neighbors.by_node(now_ns=now_ns)))
 
     def on_sensor(self, reading: SensorReading, *, now_ns: int) -> None:
-        """A UAV whose battery makes it leave gives up its place and its task at once."""
+        """Hand a reading to the part that needs it; any other reading is ignored."""
         match reading:
             case WifiScan():
                 self._reception.scan(reading.heard, now_ns=now_ns)
@@ -312,7 +313,7 @@ class Searcher:
                 pass
 
     def _leave(self, now_ns: int) -> None:
-        """Give up the place and the task, tell all, and fly home."""
+        """Give up the place and the task, and tell all."""
         self._give_up(now_ns)
         self._plans.say_status(self._percent, now_ns)
 
@@ -322,13 +323,15 @@ class Searcher:
         self._review_mode(now_ns)
 
     def _is_over(self, now_ns: int) -> bool:
-        """True once the area was swept often enough, and nobody is sought or it was swept once more."""
+        """True once the area was swept as often as the scenario wants, and nobody is sought any more or it was swept
+        once more.
+        """
         if not self._is_swept(now_ns):
             return False
         return not self._survivors.sought() or self._place.is_swept(now_ns, times=self._limits.sweeps + 1)
 
     def _is_swept(self, now_ns: int) -> bool:
-        """True once the area was swept often enough."""
+        """True once the area was swept as often as the scenario wants; False if it sets no limit."""
         sweeps = self._limits.sweeps
         return bool(sweeps) and self._place.is_swept(now_ns, times=sweeps)
 
@@ -362,7 +365,7 @@ class Searcher:
             self._announcing.on_returned(now_ns)
 
     def _on_heard(self, now_ns: int) -> None:
-        """Another UAV was heard; a UAV that flew home because it heard nobody takes part again."""
+        """Another node was heard: if this UAV flies home because it heard nobody, it takes part again."""
         if self._return_home.on_heard(now_ns):
             self._take_part_again(now_ns)
 
@@ -421,11 +424,11 @@ class Searcher:
 
     @property
     def _percent(self) -> int:
-        """The percentage of its battery that this UAV may spend for the search; 0 if it has no part in it any more."""
+        """The percentage of its battery that this UAV may spend for the search; 0 while it takes no part in it."""
         return 0 if self._orders.errand is not None else self._return_home.percent
 
     def _on_found(self, found: Found, now_ns: int, *, flooded: bool) -> None:
-        """Another node states the place of a survivor: an estimate, a confirmation, or a refutation."""
+        """Another node states its estimate of a survivor's place, or a verdict."""
         if self._survivors.on_found(found, now_ns=now_ns):
             self._announcing.decided(found.survivor, now_ns)
             if is_person(found.survivor):
@@ -442,7 +445,9 @@ class Searcher:
     # --- sent messages --------------------------------------------------------------------------------------------
 
     def hello_frames(self, now_ns: int) -> bytes:
-        """The inner frames for the next hello: the latest reports, the best bids, recent verdicts and orders."""
+        """The inner frames for the next hello: the latest reports, the best bids, recent verdicts, orders, and who was
+        heard when.
+        """
         frames = b"".join(report.encode_frame(self._node) for report in self._survivors.recent_reports(now_ns=now_ns))
         bids = self._bidding.bids_to_tell(now_ns=now_ns)
         if bids:
@@ -452,6 +457,7 @@ class Searcher:
 
 
 def phone_model(scenario: Scenario) -> PhoneModel:
+    """What UAVs assume of phones: rubble takes half of `mission.rubble_db` from the power of each, give or take it."""
     mission = scenario.mission
     half_db = mission.rubble_db / 2
     return PhoneModel(
@@ -483,10 +489,12 @@ def formation(scenario: Scenario, count: int) -> Pattern | None:
 
 
 def _of_few(scenario: Scenario, count: int) -> Pattern:
+    """The formation in which UAVs search that are too few for the formation of the scenario."""
     return of_few(count, demands_of(scenario), connected=scenario.mission.connection == "always")
 
 
 def demands_of(scenario: Scenario) -> Demands:
+    """What a scenario demands of the formation of its search."""
     return Demands(
         area_m=scenario.world.area_m,
         seen_m=_ground_range_m(scenario),

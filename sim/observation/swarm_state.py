@@ -40,7 +40,7 @@ from fanet_mw.wire.survivors import Found, Standing
 from sim.observation.event_text import event_line
 from sim.observation.observer import Observer
 from sim.observation.turns import Turns, turns
-from sim.results.mission import OverflownCells, SurvivorStates
+from sim.results.mission import CoveredCells, SurvivorStates
 from sim.world.environment.survivors import place
 
 LATELY_NS: Final = 10 * S
@@ -183,7 +183,7 @@ class SwarmState(Observer):
         self._app = next(iter(scenario.traffic_classes))
         self._targets: dict[tuple[str, int], int] = {}
         self._links: deque[LinkStats] = deque()
-        self._cells = OverflownCells(scenario)
+        self._cells = CoveredCells(scenario)
         self._by_poses = False
         self._pruned_ns = 0
         self._trailed_ns = -S

@@ -20,7 +20,7 @@ from fanet_mw.wire.survivors import Found, Standing, is_person
 from sim.report.html import Rows
 from sim.report.run_records import RunRecords
 from sim.report.run_rows import number, percent
-from sim.results.mission import OverflownCells, left_by
+from sim.results.mission import CoveredCells, left_by
 from sim.results.run_folder import RunFolder
 
 _INSIDE: Final = "inside a building"
@@ -181,7 +181,7 @@ def _seconds(t_ns: int | None) -> str:
 
 def unsearched(run: RunRecords) -> tuple[float, list[Piece]]:
     """The share of the area that no UAV has searched, and its connected pieces, the largest first."""
-    cells = OverflownCells(run.scenario)
+    cells = CoveredCells(run.scenario)
     cells.add(run.flown())
     missing = ~cells.seen
     half, count = run.scenario.world.area_m / 2, len(missing)

@@ -17,7 +17,7 @@ from sim.figures.colors import BLUE, DARK, GREEN, ORANGE, PINK, RED
 from sim.figures.style import canvas, legend_above
 from sim.report.run_pictures import RunPicture, map_canvas
 from sim.report.run_records import RunRecords
-from sim.results.mission import Confirmations, OverflownCells, overflown
+from sim.results.mission import Confirmations, CoveredCells, covered_over_time
 
 _STEPS: Final = ((Detected, "detected", ORANGE, "o", "-"), (Approaching, "approached", BLUE, "s", "--"),
                  (Arrived, "reached", PINK, "^", "-."))  # fmt: skip
@@ -32,7 +32,7 @@ def progress(run: RunRecords) -> RunPicture | None:
     """Survivors detected, approached, reached and confirmed, and the area covered, over time."""
     people = run.scenario.mission.survivors
     lines = [line for line in _lines(run) if line[1]] if people else []
-    covered = [(t_ns / S, cells.share) for t_ns, cells in overflown(run.scenario, run.tracks.values())]
+    covered = [(t_ns / S, cells.share) for t_ns, cells in covered_over_time(run.scenario, run.tracks.values())]
     if not lines and not covered:
         return None
     panels = [bool(lines), bool(covered)].count(True)
@@ -147,7 +147,7 @@ def tracks(run: RunRecords) -> RunPicture | None:
     figure, axes = map_canvas([(-half, -half), (half, half), *(at for track in flown for at in track)])
     axes.add_patch(Rectangle((-half, -half), 2 * half, 2 * half, fill=False, edgecolor=DARK, linestyle="--",
                              linewidth=0.9, label="area to be searched"))  # fmt: skip
-    cells = OverflownCells(run.scenario)
+    cells = CoveredCells(run.scenario)
     cells.add(run.flown())
     if not cells.seen.all():
         axes.imshow(~cells.seen, extent=(-half, half, -half, half), origin="lower", cmap=_UNSEARCHED, vmin=0, vmax=1,

@@ -44,14 +44,17 @@ from sim.world.sensors.phone import REFERENCE_LOSS_DB
 _HOMEWARD: Final = frozenset({"return", "done", "recall", "land"})
 """The mission modes of a UAV that has left the search."""
 _WRECKED: Final = "fallen"
+"""The flight mode of a UAV that has crashed."""
 _RETURNING: Final = "return"
 """The flight mode of a UAV that its flight controller brings home."""
 _CELL_M: Final = 25.0
+"""The length of the sides of the cells in which the area is counted, or nearly: a whole number of them fits."""
 _MOST_DECADES: Final = 12.0
 """The greatest range of a phone's receiver is 10^12 m, farther than anything is apart; its square is a number."""
 _NEARLY_ALL: Final = 0.95
+"""The share of the area whose first instant is a figure (`covered_95_s`)."""
 MISTAKEN_M: Final = 25.0
-"""A UAV that announces a survivor farther than this from the true place has mistaken somebody else."""
+"""A confirmation farther than this from the survivor's true place counts as mistaken: somebody else was seen there."""
 
 
 def mission(scenario: Scenario, records: Collection[Record]) -> dict[str, Any]:
@@ -106,7 +109,7 @@ _Placed = Approaching | Confirmed | PlacedInside | PlacedAmong
 
 
 class Confirmations:
-    """The survivors whom UAVs have announced, up to the records seen so far."""
+    """The confirmations of survivors that hold after the records that were taken in."""
 
     def __init__(self, truth: Sequence[Enu]) -> None:
         """`truth`: the true places of the survivors, in the order of their ids."""
@@ -131,14 +134,15 @@ class Confirmations:
                 self.reopened += not is_person(record.survivor)
 
     def _keep_as_persons(self, refuted: Refuted, *, since_ns: int) -> None:
-        """A UAV that refutes a confirmation tells at the same instant that a person without a phone is there. That
-        person counts as found since the refuted confirmation.
+        """Let a person without a phone whom a UAV reports at the instant and place of a refutation count as found since
+        the confirmation that is refuted.
         """
         for number, finds in self._held.items():
             if is_person(number) and finds and finds[0].t_ns == refuted.t_ns and not left_by(refuted, finds):
                 self._as_ns[number] = since_ns
 
     def error_m(self, placed: _Placed) -> float:
+        """The distance of the stated place of a survivor from the true one."""
         at = self._truth[placed.survivor - 1]
         return math.hypot(at.east - placed.east_m, at.north - placed.north_m)
 
@@ -155,8 +159,8 @@ class Confirmations:
         return [one for one in self._first() if self.error_m(one) > MISTAKEN_M]
 
     def persons(self) -> tuple[dict[int, Confirmed], int]:
-        """The finds of persons without a phone by survivor, the nearest pairs first, and the number of all other such
-        finds: false ones, and further ones of the same survivor.
+        """The find of a person without a phone that belongs to each survivor, and the number of all other such finds:
+        false ones, and further ones of the same survivor. Nearest pairs are matched first.
         """
         finds = {number: held[0] for number, held in sorted(self._held.items()) if held and is_person(number)}
         near = sorted(
@@ -172,7 +176,9 @@ class Confirmations:
         return {survivor: finds[number] for survivor, number in of.items()}, len(finds) - len(of)
 
     def found_ns(self) -> dict[int, int]:
-        """When each survivor was found: by phone, as a person without one, or at first under another's phone."""
+        """The instant at which each survivor was found: by phone, as a person without one, or first by mistake under
+        the number of another survivor.
+        """
         persons, _ = self.persons()
         found = {survivor: self._as_ns.get(find.survivor, find.t_ns) for survivor, find in persons.items()}
         for one in self.right():
@@ -214,8 +220,8 @@ def _median(values: list[float]) -> float | None:
 
 
 def _flown(scenario: Scenario, records: Iterable[Record]) -> dict[str, Any]:
-    """Coverage and coherence; None if the trace has no positions."""
-    covered, photographed = OverflownCells(scenario), PhotographedCells(scenario)
+    """The figures of where UAVs flew: coverage, coherence and separation; each None if the trace has no positions."""
+    covered, photographed = CoveredCells(scenario), PhotographedCells(scenario)
     graphs: list[Coherence] = []
     by_distance: list[bool] = []
     ever_parted = False
@@ -268,17 +274,21 @@ def _usual(values: list[int]) -> dict[str, float]:
 
 
 class _Instant(NamedTuple):
+    """The swarm at one instant."""
+
     t_ns: int
     at: Rows
-    """The positions of the UAVs alive."""
+    """The positions of the UAVs whose programs run."""
     nodes: npt.NDArray[np.int64]
+    """Their ids."""
     searching: Flags
+    """True for those that search: on the air, not crashed, and not on the way home."""
     extents: tuple[Extent, ...]
-    """What parts the air."""
+    """The partitions and jammed areas in force."""
 
 
 def _instants(scenario: Scenario, records: Iterable[Record]) -> Iterator[_Instant]:
-    """The instants with positions."""
+    """The swarm at each instant of which the trace has positions."""
     absent, air = Absentees(), PartedAir(scenario.radio)
     extents = air.in_force
     wrecked: set[int] = set()
@@ -334,8 +344,8 @@ class _Cells:
         return self._seen.copy()
 
 
-class OverflownCells(_Cells):
-    """The cells of the area that UAVs have flown over."""
+class CoveredCells(_Cells):
+    """The cells of the area whose middle has come within the nominal range of a phone's receiver."""
 
     def __init__(self, scenario: Scenario) -> None:
         super().__init__(scenario)
@@ -344,6 +354,7 @@ class OverflownCells(_Cells):
         self._range_m = 10 ** min(_MOST_DECADES, budget_db / (10 * mission.phone_exponent))
 
     def add(self, at: Iterable[tuple[float, float, float]]) -> None:
+        """UAVs were at these places."""
         for east, north, up in at:
             ground2 = self._range_m**2 - up**2
             if ground2 <= 0:
@@ -354,9 +365,11 @@ class OverflownCells(_Cells):
             self._seen[np.ix_(near_n, near_e)] |= within
 
 
-def overflown(scenario: Scenario, tracks: Iterable[Iterable[Posed]]) -> Iterator[tuple[int, OverflownCells]]:
-    """Each instant of the UAVs' tracks, with the cells that they have flown over by then."""
-    cells = OverflownCells(scenario)
+def covered_over_time(scenario: Scenario, tracks: Iterable[Iterable[Posed]]) -> Iterator[tuple[int, CoveredCells]]:
+    """Each instant of the UAVs' tracks, with the cells that they have covered by then; the cells are always the same
+    object.
+    """
+    cells = CoveredCells(scenario)
     posed = sorted((one for track in tracks for one in track), key=lambda one: one.t_ns)
     for t_ns, together in groupby(posed, key=lambda one: one.t_ns):
         cells.add([(one.east_m, one.north_m, one.up_m) for one in together])
@@ -381,10 +394,13 @@ class PhotographedCells(_Cells):
 
 
 UNHEARD: Final = "not heard"
+"""The status of a survivor whose phone nobody has received yet."""
 _STAGES: Final[Mapping[type[Any], str]] = {
     Detected: "detected", Approaching: "approached", Arrived: "reached", PlacedInside: "inside", PlacedAmong: "among",
 }  # fmt: skip
+"""The status to which a record of each type leads."""
 _ORDER: Final = (UNHEARD, *_STAGES.values())
+"""These statuses, from the first to the last; a survivor does not go back from a later one to an earlier one."""
 
 
 class SurvivorState(NamedTuple):
@@ -392,8 +408,9 @@ class SurvivorState(NamedTuple):
 
     t_ns: int
     status: str
-    """`inside`: said to be in a building; `among`: said to be one of several people; `mistaken`: confirmed far from the
-    true place; `reopened`: the confirmation was taken back.
+    """`not heard`, `detected`: a phone was received, `approached`, `reached`, or `confirmed`; `inside`: said to be in a
+    building; `among`: said to be one of several people; `mistaken`: confirmed far from the true place; `reopened`: the
+    confirmation was taken back.
     """
     node: int
     """The UAV that brought this about; 0 if there was none."""
@@ -426,7 +443,7 @@ class SurvivorStates:
         return sum(state.status == status for state in self.now.values())
 
     def _status(self, record: Record, before: str) -> str:
-        """The status of the survivor of a record; one who is confirmed does not go back to `detected`."""
+        """The status of the survivor of a record, who had the status `before`."""
         if isinstance(record, Confirmed | Refuted):
             if record.survivor in {one.survivor for one in self._held.right()}:
                 return "confirmed"

@@ -1,7 +1,8 @@
-"""The pairs of nodes between which faults let nothing pass: on different sides of a partition, or one of the two in an
-area so jammed that nothing is received there, because a link is between two who hear each other.
+"""The pairs of nodes between which faults leave no link, because a link is between two that hear each other: nodes on
+different sides of a partition, and nodes of which one is in an area where a jammer lets nothing be received.
 
-Not known here: jammers through which near nodes are still received, and weaker links.
+Not known here: jammers through which near nodes are still received, degraded links, nodes whose radio is off, and
+partitions of so many nodes that their record does not name them.
 """
 
 import math
@@ -22,14 +23,17 @@ class Extent(NamedTuple):
     """Where a fault is, read from its record."""
 
     word: str
+    """`nodes`, `line` or `circle`."""
     numbers: tuple[float, ...]
+    """The nodes of one side; east and north of two points of a line; or east, north, radius and noise of a circle."""
 
 
 class PartedAir:
-    """The partitions and jammed areas in force, as records tell in their order."""
+    """The partitions and jammed areas that are in force after the records that were taken in, in their order."""
 
     def __init__(self, radio: Radio) -> None:
-        self._all_deafen = radio.channel == "range"  # it has no SNR
+        self._all_deafen = radio.channel == "range"
+        """Whether nothing is received in any jammed area, because the channel has no SNR."""
         self._by_label: dict[str, Extent] = {}
 
     def take(self, record: RadioFault) -> None:
@@ -44,7 +48,9 @@ class PartedAir:
 
 
 def parted(extents: tuple[Extent, ...], at: Rows, nodes: npt.NDArray[np.int64]) -> Flags:
-    """Whether nothing passes between each pair of these nodes at these places; never true of a node and itself."""
+    """For each pair of these nodes, at these places: True if there can be no link between both. False for a node and
+    itself.
+    """
     cut = np.zeros((len(at), len(at)), bool)
     for word, numbers in extents:
         if word == "circle":
@@ -63,7 +69,7 @@ def parted(extents: tuple[Extent, ...], at: Rows, nodes: npt.NDArray[np.int64]) 
 
 
 def _read(text: str) -> Extent | None:
-    """The extent that a record states; None if it states none."""
+    """The extent that a record states; None if it states none, or no valid one."""
     word, *rest = text.split() or [""]
     try:
         numbers = tuple(map(float, rest))

@@ -17,7 +17,7 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import FlightModeChanged, MissionModeChanged, Planned, Posed, Record, RoleChanged
 from fanet_mw.units import Enu, NodeId, S
-from sim.results.mission import OverflownCells, SurvivorState, SurvivorStates, overflown
+from sim.results.mission import CoveredCells, SurvivorState, SurvivorStates, covered_over_time
 from sim.results.run_folder import RunFolder
 from sim.world.environment.layout import positions
 from sim.world.environment.survivors import place
@@ -123,8 +123,8 @@ class Replay:
     @cached_property
     def covered_ns(self) -> npt.NDArray[np.int64]:
         """The instant at which each cell was covered first, -1: never; rows from south to north."""
-        first = np.full(OverflownCells(self.scenario).seen.shape, -1, np.int64)
-        for t_ns, cells in overflown(self.scenario, self._posed.values()):
+        first = np.full(CoveredCells(self.scenario).seen.shape, -1, np.int64)
+        for t_ns, cells in covered_over_time(self.scenario, self._posed.values()):
             first[cells.seen & (first < 0)] = t_ns
         return first
 

@@ -1,5 +1,5 @@
-"""What a scenario says that will not happen, or that had to be guessed: sentences for its author, who may have meant
-something else. No run is refused for it.
+"""Notes on a scenario, for its author: what it asks for and will not come about, what it makes risky, and what had to
+be guessed. No run is refused because of a note.
 """
 
 import math
@@ -18,21 +18,25 @@ from fanet_mw.wire.search_plan import MOST_PLACES
 
 _NAMED: Final = 3
 """A note names at most this many things, and gives the number of the others."""
-
-
 _ONLY_WITH: Final = re.compile(r"`\w+`(?:(?:, | and |, and )`\w+`)*: ")
+"""How the documentation of a key begins that has an effect with some keys, or choices of a key, only: `spiral`: ..."""
 _BUT: Final = re.compile(r"(?:all|every) (\w+?)s? but `(\w+)`", re.IGNORECASE)
+"""How the documentation of a key excludes one choice of another key: all models but `static`."""
 _WORDS: Final = re.compile(r"`(\w+)`")
 _OFF: Final = ("none", "", False, None)
+"""The values with which a key switches something off."""
 _BETWEEN_BANDS_MHZ: Final = 3700.0
+"""A lower frequency is of the band at 2.4 GHz, a higher one of that at 5 GHz."""
 _CLUSTERED: Final = frozenset({"clustered"})
+"""The protocols that read the table `clusters`."""
 _LEVEL_M: Final = 3.0
-"""The least distance of the heights of UAVs that cannot know of each other."""
+"""The heights of UAVs that cannot know of each other should be at least so far apart."""
 _SIGMAS: Final = 2.0
-"""The error of one receiver beside another, in standard deviations, for which pads should leave room."""
+"""Pads should be so far apart that two receivers may differ by so many standard deviations of their difference."""
 
 
 def notes(scenario: Scenario) -> list[str]:
+    """All notes on a scenario, one sentence each; empty if there are none."""
     kinds = (
         _after_the_end, _without_effect, _without_place, _still_waves, _beyond_the_vehicle, _close_pads, _low_ceiling,
         _high_roofs, _empty_batteries, _out_of_reach, _odd_band, _wide_formation, _keeping_clear_of_nobody, _guessed,
@@ -41,6 +45,7 @@ def notes(scenario: Scenario) -> list[str]:
 
 
 def _after_the_end(scenario: Scenario) -> Iterator[str]:
+    """Faults, orders, jumps of clocks and packets whose instants are after the end of the run."""
     instants = {f"faults.{index}.at_s": fault.at_s for index, fault in enumerate(scenario.faults)}
     instants |= {f"orders.{index}.at_s": order.at_s for index, order in enumerate(scenario.orders)}
     instants |= {f"clock.jumps.{index}.1": at_s for index, (_, at_s, _) in enumerate(scenario.clock.jumps)}
@@ -60,7 +65,7 @@ def _after_the_end(scenario: Scenario) -> Iterator[str]:
 
 
 def _without_effect(scenario: Scenario) -> Iterator[str]:
-    """Keys that were set for something else than what was chosen, by the first words of their documentation."""
+    """Keys that were set and have no effect with what other keys choose, as the documentation of each key says."""
     protocol = scenario.routing.protocol
     if protocol in PROTOCOLS and protocol not in _CLUSTERED and scenario.mission.formation == "none":
         unused = list(_changed(scenario.clusters))
@@ -105,6 +110,7 @@ def _is_given(section: Section, key: str) -> bool:
 
 
 def _without_place(scenario: Scenario) -> Iterator[str]:
+    """UAVs beyond those that the plan of a search can name."""
     more = scenario.nodes.count - MOST_PLACES
     if scenario.mission.search != "none" and more > 0:
         yield (
@@ -114,6 +120,7 @@ def _without_place(scenario: Scenario) -> Iterator[str]:
 
 
 def _still_waves(scenario: Scenario) -> Iterator[str]:
+    """Fading that never changes."""
     radio = scenario.radio
     if radio.fading != "none" and not radio.scatterer_speed_m_s and scenario.mobility.model == "static":
         yield (
@@ -123,6 +130,7 @@ def _still_waves(scenario: Scenario) -> Iterator[str]:
 
 
 def _beyond_the_vehicle(scenario: Scenario) -> Iterator[str]:
+    """A speed that the vehicle cannot fly, or not against the wind."""
     world, asked_m_s = scenario.world, scenario.mobility.speed_m_s
     airspeed_m_s, most_m_s = asked_m_s + math.hypot(*world.wind_m_s), FASTEST_AIR_M_S[world.vehicle]
     if world.engine == "rotors" and scenario.mobility.model != "static" and airspeed_m_s > most_m_s:
@@ -134,7 +142,7 @@ def _beyond_the_vehicle(scenario: Scenario) -> Iterator[str]:
 
 
 def _out_of_reach(scenario: Scenario) -> Iterator[str]:
-    """Nodes that hear nobody at the start: any that rest, or all."""
+    """Nodes that hear nobody where they start: any if they rest, otherwise only all of them together."""
     radio, count = scenario.radio, scenario.node_count
     if radio.channel != "range" or count < 2:
         return
@@ -149,7 +157,9 @@ def _out_of_reach(scenario: Scenario) -> Iterator[str]:
 
 
 def _odd_band(scenario: Scenario) -> Iterator[str]:
-    """DSSS and CCK are those of the band at 2.4 GHz (802.11-2020, 15 and 16), and `a` is that at 5 GHz (17)."""
+    """A frequency outside the band of the standard: DSSS, CCK and ERP are of 2.4 GHz (802.11-2020, 15, 16 and 18), and
+    `a` is of 5 GHz (17).
+    """
     radio = scenario.radio
     low = radio.frequency_mhz < _BETWEEN_BANDS_MHZ
     if radio.channel != "range" and (radio.standard == "a") == low:
@@ -201,7 +211,9 @@ def _low_ceiling(scenario: Scenario) -> Iterator[str]:
 
 
 def _high_roofs(scenario: Scenario) -> Iterator[str]:
-    """Buildings higher than UAVs fly: they cut links at once, which bounds by distances do not foresee."""
+    """Buildings higher than UAVs fly: they cut links at once, which a bound that counts on distances does not
+    foresee.
+    """
     world, altitude_m = scenario.world, scenario.nodes.altitude_m
     protocol = scenario.routing.protocol
     promises = protocol == "rounds" or (protocol in _CLUSTERED and scenario.clusters.relay == "scheduled")
@@ -228,6 +240,7 @@ def _high_roofs(scenario: Scenario) -> Iterator[str]:
 
 
 def _empty_batteries(scenario: Scenario) -> Iterator[str]:
+    """Batteries that have no charge to spend for a search."""
     most, reserve = scenario.world.charge[1], scenario.mission.reserve_charge
     if scenario.mission.search != "none" and scenario.sensors.battery_hz and most <= reserve:
         yield (
@@ -255,6 +268,7 @@ def _wide_formation(scenario: Scenario) -> Iterator[str]:
 
 
 def _keeping_clear_of_nobody(scenario: Scenario) -> Iterator[str]:
+    """UAVs that fly to survivors by the paper's rule, and that nothing keeps clear of each other."""
     mission = scenario.mission
     by_rule = (mission.search, mission.formation, scenario.mobility.model) == ("none", "none", "onboard")
     if by_rule and mission.survivors and not mission.collision_horizon_s:
@@ -273,6 +287,7 @@ def _changed(section: Section) -> Iterator[str]:
 
 
 def _guessed(scenario: Scenario) -> Iterator[str]:
+    """Heights that map files do not state, or state oddly."""
     world = scenario.world
     if not (world.buildings_geojson or world.heightmap):
         return

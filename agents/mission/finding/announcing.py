@@ -1,8 +1,8 @@
-"""What one UAV floods about survivors: its verdicts, and its estimate of one to whom it flies, or nobody does.
+"""What one UAV floods about survivors: its verdicts, and its estimate of a survivor to whom it flies, or nobody does.
 
-Who makes a verdict (confirmed, refuted, inside a building, among people, or a person without a phone) floods it three
-times; hellos say it meanwhile. One in four of those who know it floods it again when another UAV does not seem to.
-Whoever hears a lost UAV again floods all verdicts that were not flooded just now.
+A UAV that makes a verdict (confirmed, refuted, inside a building, among people, or a person without a phone) floods it
+three times, and hellos pass it on meanwhile. When a UAV does not seem to know a verdict, one in four of those that know
+it floods it again. A UAV that hears a lost one again floods all verdicts that were not flooded just now.
 """
 
 from collections.abc import Iterable
@@ -23,20 +23,22 @@ _AGAIN_NS: Final = 7 * S
 _IMPROVEMENT: Final = 0.8
 """A UAV floods its estimate again when the standard deviation has decreased to at most this share."""
 _USEFUL_M: Final = 60.0
-"""An estimate with a greater standard deviation is not flooded."""
+"""An estimate with a greater standard deviation is flooded only to replace a wrong one."""
 _WRONG_SIGMAS: Final = 2.0
-"""A UAV that no longer holds its estimate likely floods another one, however vague: so far from it."""
+"""The estimate that a UAV flooded last is wrong if its present one is more than so many standard deviations away."""
 _PASSED_ON_NS: Final = 12 * S
 """How long hellos pass on a verdict."""
 _POST_NS: Final = 5 * S
-"""How long the post on the ground is taken to be in reach after a hello of its."""
+"""How long the post on the ground is taken to be in reach after it has sent a hello."""
 _PASSED_ON: Final = 3
 """The greatest number of verdicts in one hello."""
 _LATELY_NS: Final = 4 * S
-"""Parts of a swarm that meet tell each other no verdict that was flooded within this time."""
+"""A UAV that hears a lost one again does not flood verdicts that somebody has flooded within this time."""
 _TURN_NS: Final = 150 * MS
 _TURNS: Final = 6
-"""Who hears a lost UAV again waits for its turn, one of so many of this length by its id, so that not all speak."""
+"""It floods the others in its turn, one of so many of this length, by its id: what one has flooded the next ones do
+not.
+"""
 _TELLERS: Final = 4
 """If a UAV does not seem to know of a verdict, one in this number of the UAVs that know it floods it again."""
 
@@ -55,13 +57,14 @@ class Announcing:
         self._told: dict[int, Estimate] = {}
         """The estimate of each survivor's place that this UAV flooded last."""
         self._tellings: dict[int, tuple[int, int]] = {}
-        """For each survivor that this UAV has confirmed or refuted: how often that is still flooded, and when next."""
+        """For each survivor on whom this UAV has made a verdict: how often that is still flooded, and when next."""
         self._heard_ns: dict[int, int] = {}
         """The instant at which this UAV learned or made the verdict on each survivor, or was last reminded of it by a
         UAV that did not seem to know it."""
-
         self._post_ns: int | None = None
+        """The instant at which the post on the ground was heard last."""
         self._told_post = 0
+        """The number of hellos that had a verdict for the post; it says whose turn is next."""
         self._flooded_ns: dict[int, int] = {}
         """The instant at which somebody last flooded each verdict that this UAV knew already."""
         self._meets_ns: int | None = None
@@ -141,12 +144,13 @@ class Announcing:
         self.decided(survivor, now_ns)
 
     def decided(self, survivor: int, now_ns: int) -> None:
+        """A verdict is new to this UAV, which has made it or received it."""
         self._heard_ns[survivor] = now_ns
         self._told.pop(survivor, None)
 
     def tell(self, task: int | None, now_ns: int, *, unattended: Iterable[int] = ()) -> None:
-        """Flood the verdicts that are due, and the estimate of the survivor to whom this UAV flies. A UAV that has
-        received the phone of one to whom nobody flies (`unattended`) floods its estimate, too, if it is the best.
+        """Flood the verdicts that are due, and the estimate of the survivor to whom this UAV flies (`task`); also that
+        of each survivor to whom nobody flies (`unattended`), if this UAV has the best one.
         """
         if self._meets_ns is not None and now_ns >= self._meets_ns:
             self._meets_ns = None
@@ -168,8 +172,8 @@ class Announcing:
                 self._tell_estimate(survivor, now_ns)
 
     def _places_best(self, survivor: int) -> bool:
-        """True if this UAV has received the phone, and its estimate is clearly better than the best that was told, or
-        the first: another UAV may pass the survivor unaware.
+        """True if this UAV has received the phone of a survivor, and its estimate is the first, or clearly better than
+        the one announced: another UAV may pass the survivor without knowing.
         """
         known = self._survivors.by_id[survivor]
         own = known.own_place()
@@ -183,11 +187,11 @@ class Announcing:
             self._remind(report.survivor, report.reporter, now_ns)
 
     def outdated(self, found: Found, now_ns: int) -> None:
-        """Another node floods a confirmation that was taken back."""
+        """Another node floods a confirmation that this UAV knows to be taken back."""
         self._remind(found.survivor, found.node, now_ns)
 
     def _remind(self, survivor: int, of_node: int, now_ns: int) -> None:
-        """Flood a verdict again, unless that was done recently or other UAVs are to do it."""
+        """Flood a verdict again that `of_node` does not seem to know, unless that was done recently or others do it."""
         verdict = self._survivors.verdict(survivor)
         if verdict is None or now_ns - self._heard_ns.get(survivor, now_ns) <= _AGAIN_NS:
             return
@@ -196,7 +200,9 @@ class Announcing:
             self._flood(verdict)
 
     def hello_frames(self, now_ns: int) -> bytes:
-        """Recent verdicts for the next hello; while the post on the ground is in reach, the others too, in turn."""
+        """Recent verdicts for the next hello; while the post on the ground is in reach, also one of the others, each in
+        its turn.
+        """
         recent = [(t_ns, survivor) for survivor, t_ns in self._heard_ns.items() if now_ns - t_ns < _PASSED_ON_NS]
         chosen = [survivor for _, survivor in sorted(recent, reverse=True)[:_PASSED_ON]]
         if self._post_ns is not None and now_ns - self._post_ns < _POST_NS:
@@ -217,7 +223,7 @@ class Announcing:
                 self._flood(verdict)
 
     def _tell_estimate(self, survivor: int, now_ns: int) -> None:
-        """Flood the estimate of a responder if it has become clearly better, or the one that it has told is wrong."""
+        """Flood this UAV's estimate of a survivor if it has become clearly better, or the one flooded last is wrong."""
         place, told = self._survivors.by_id[survivor].own_place(), self._told.get(survivor)
         if place is None or (told is None and place.sigma_m > _USEFUL_M):
             return

@@ -1,4 +1,8 @@
-"""Connectivity maintenance: half-planes of velocities that keep a UAV within radio reach of those it is tied to."""
+"""Connectivity maintenance: half-planes of velocities that keep a UAV in radio reach of others, and whom it seeks.
+
+A UAV is tied to those whose places are beside its own. On the way to the places it is tied to neighbors whose links
+will last, and rows give way to UAVs that respond (`_give_way`). When the swarm has come apart it seeks the other part.
+"""
 
 import math
 from collections.abc import Collection, Sequence
@@ -7,9 +11,9 @@ from typing import Final
 from agents.mission.navigation.half_planes import HalfPlane, Velocity
 from agents.mission.navigation.neighbor_motions import NeighborMotions
 from agents.mission.navigation.own_motion import OwnMotion
-from agents.mission.search_formation.formation_place import FormationPlace
 from agents.mission.search_formation.lasting_links import LASTING
 from agents.mission.search_formation.pattern import Pattern
+from agents.mission.search_formation.search_place import SearchPlace
 from agents.mission.tasking.bidding import Bidding
 from fanet_mw.motion import Motion
 from fanet_mw.units import Enu, NodeId
@@ -21,50 +25,47 @@ _TETHER_S: Final = 2.0
 """A UAV may use up the rest of that distance in this time at the earliest."""
 _CLOSING: Final = 0.97
 _CLOSING_S: Final = 1.0
-"""The same two while ranks are closed over somebody who is lost, and every second counts."""
+"""The same two while ranks are closed over a lost UAV, and every second counts."""
 _FOLLOWS: Final = 0.88
-"""The greatest distance, as such a share, of one that is nearer to a gap while the swarm is apart: a line waits and
-turns back for its chain rather than hold it back.
+"""While the swarm is apart a UAV keeps within this share of the reach of a neighbor whose place is fewer ties from the
+other part: its whole row turns back with that neighbor rather than hold it back.
 """
 _LED: Final = 0.8
-"""Before the sweep a UAV without a task keeps within this share of the reach of a neighbor that responds: otherwise the
-responder would be held where its links end, before it sees the survivor.
+"""Before the sweep a UAV keeps within this share of the reach of a neighbor that responds, unless it is itself the
+first at a survivor: otherwise the responder would be held where its links end, before it sees the survivor.
 """
 _LED_PER_HOP: Final = 0.04
 _LED_HOPS: Final = 4
-"""A UAV up to so many hops from the responder keeps within so much more of the reach, for each hop, of neighbors that
-are nearer to it: a whole row gives way a little, where one alone would hold the responder back.
+"""A UAV up to so many hops from the responder keeps in reach of neighbors that are nearer to it. The share of the reach
+grows by this with each hop: a whole row gives way a little, where one UAV alone would hold the responder back.
 """
 _HASTE: Final = 0.95
-"""Whoever is too far away for that is approached at this share of the greatest speed."""
-
+"""A UAV flies back into such a limit at this share of its greatest speed at most."""
 _HURRIES: Final = 0.9
 _SETS_OUT_S: Final = 2.0
-"""Who is beyond a gap has noticed the loss after this time, and flies here at this share of the speed for that."""
+"""A UAV beyond a gap is taken to have noticed the loss after this time, and to come at this share of that speed."""
 _UNSURE: Final = 0.7
-"""Who is on the way may be late: it is sought up to this share of the reach from where it should be, until it is heard.
+"""A UAV of another part may be late on its way. One that should be within this share of the reach and is not heard is
+not sought where it should be.
 """
-
 _KEPT_M_S: Final = 1e-6
 """A velocity keeps to a limit up to this rounding error."""
 _EARLY_TIES: Final = 2
 """A UAV that hears nobody to whom it is tied, because it has no plan or those beside it come late, stays connected with
-so many of its nearest neighbors."""
+so many of its nearest neighbors.
+"""
 _STRONG: Final = 0.75
 """A link is strong if it is now, and will be at the places, shorter than this share of the radio's reach."""
 
 
 class ConnectivityMaintenance:
-    """Keeps a UAV of a team, or a relay, in reach of the places to which it is tied (`Shape.tethers`), a follower in
-    reach of its team's nearest UAV, and all on the way to their places in reach of links that last. Who hears none of
-    these, or has no plan, stays in reach of its nearest neighbors.
-    """
+    """The limits of one UAV's velocity that keep it in reach of others, and the UAVs that it seeks."""
 
     def __init__(
         self,
         own_motion: OwnMotion,
         neighbors: NeighborMotions,
-        formation: FormationPlace,
+        formation: SearchPlace,
         bidding: Bidding,
         *,
         reach_m: float,
@@ -74,11 +75,11 @@ class ConnectivityMaintenance:
         self._formation, self._bidding = formation, bidding
         self._reach_m, self._haste_m_s = reach_m, _HASTE * speed_m_s
         self._ties: list[tuple[NodeId, HalfPlane]] = []
-        """The UAVs in reach to which this one is tied, and the limits that keep it there."""
+        """The UAVs in reach to which this one is tied, and the limits of its velocity that keep it there."""
 
     def planes(self, now_ns: int) -> list[HalfPlane]:
-        """The limits of the longest links first: of those that contradict each other the last are dropped, and a
-        neighbor that goes away must not draw this UAV off one that stays.
+        """The limits of the velocity, those of the longest links first, because the last ones are dropped if they
+        contradict others: a near neighbor that flies away must not draw this UAV off one that stays.
         """
         self._ties = []
         formation = self._formation
@@ -100,13 +101,13 @@ class ConnectivityMaintenance:
             if follows:
                 nearer = self._plane(offset, motion.velocity, _FOLLOWS, _CLOSING_S)
                 closer += [] if nearer is None else [nearer]
-        closer += self._led(ties, offsets, now_ns)
+        closer += self._give_way(ties, offsets, now_ns)
         return planes + closer  # who cannot follow so close stays in reach
 
-    def _led(self, ties: dict[NodeId, Motion], offsets: dict[NodeId, Enu], now_ns: int) -> list[HalfPlane]:
-        """The limits before the sweep that keep a UAV without a task near those who respond, and those who follow, and
-        one that responds after others near those who arrive first at some survivor: it would hold them back where
-        their links end.
+    def _give_way(self, ties: dict[NodeId, Motion], offsets: dict[NodeId, Enu], now_ns: int) -> list[HalfPlane]:
+        """The limits that draw this UAV after responders before the sweep, so that it does not hold them back where
+        their links end. A UAV without a task gives way to all, one that is not the first at its survivor to those that
+        are the first at theirs, and one that is the first to nobody.
         """
         if self._formation.is_taken_up(now_ns) or self._bidding.is_first(now_ns):
             return []
@@ -120,8 +121,8 @@ class ConnectivityMaintenance:
         return [plane for plane in planes if plane is not None]
 
     def _share_led(self, motion: Motion, offset: Enu, responders_at: Sequence[Enu], now_ns: int) -> float | None:
-        """The share of the reach within which this UAV keeps to a neighbor because that is nearer to one that responds,
-        which may be out of reach; None if it need not.
+        """The share of the reach within which this UAV keeps to a neighbor that is nearer to a responder, which may be
+        out of reach itself; None if it need not.
         """
         if offset.horizontal() < _LED * self._reach_m:
             return None
@@ -142,12 +143,12 @@ class ConnectivityMaintenance:
         )
 
     def _tied(self, now_ns: int) -> dict[NodeId, Motion]:
-        """Those within whose reach this UAV stays."""
+        """The UAVs in whose reach this one stays."""
         plan, pattern, place = self._formation.plan, self._formation.pattern, self._formation.place
         ties: dict[NodeId, Motion] = {}
         if plan is not None and pattern is not None and place is not None:
             is_settled = self._formation.is_settled(now_ns)
-            if not is_settled:  # links that last hold those who come late
+            if not is_settled:  # those who come late have no other ties yet
                 ties = self._lasting(plan, pattern, place, now_ns)
             if self._formation.is_taken_up(now_ns):
                 places = self._tied_to(pattern, place, now_ns)
@@ -163,8 +164,8 @@ class ConnectivityMaintenance:
         return (ties or self._nearest_motions(now_ns)) | self._across(now_ns)
 
     def _towards(self, late: Collection[NodeId], now_ns: int) -> dict[NodeId, Motion]:
-        """The neighbor nearest to each UAV beside which this one has its place and which it does not hear yet: a row
-        that did not stay with it would fly away alone.
+        """For each UAV that this one does not hear yet, though their places are side by side: the neighbor nearest to
+        it, so that the row does not fly away from it.
         """
         present, here, found = self._present(now_ns), self._own_motion.position, dict[NodeId, Motion]()
         for node in late:
@@ -177,7 +178,7 @@ class ConnectivityMaintenance:
         return found
 
     def _across(self, now_ns: int) -> dict[NodeId, Motion]:
-        """The nearest neighbor in another part of the swarm: the only link to it that this UAV has, and would lose."""
+        """The nearest neighbor in reach that belongs to another part of the swarm, so that the parts stay linked."""
         here, present = self._own_motion.position, self._present(now_ns)
         others = {
             node: motion.offset_from(here, now_ns).norm()
@@ -188,16 +189,20 @@ class ConnectivityMaintenance:
         return {min(near)[1]: present[min(near)[1]]} if near else {}
 
     def held(self, velocity: Enu) -> list[NodeId]:
-        """Those who stay in reach because the velocity that was chosen keeps to their limits."""
+        """The UAVs that stay in reach because the chosen velocity keeps to their limits."""
         return [node for node, plane in self._ties if plane.allows((velocity.east, velocity.north), but=_KEPT_M_S)]
 
     def beyond_gap(self, now_ns: int) -> Motion | None:
-        """The likely motion of a UAV beyond a lost one, which hurries here; None once this UAV would hear it there."""
+        """The likely motion of a UAV to be sought: of one beyond a lost one, while too far away to be heard, or of one
+        in another part of the swarm. None if there is none.
+        """
         away = [(left_m, motion) for left_m, _, motion in self._unheard(now_ns) if left_m > _CLOSING * self._reach_m]
         return min(away)[1] if away else self._parted(now_ns)
 
     def missed(self, now_ns: int) -> int | None:
-        """A UAV beyond a lost one that this one would hear by now if it had hurried here, too: it is lost as well."""
+        """A UAV beyond a lost one that this one would hear by now if both had hurried to close ranks: it is lost, too.
+        None if there is none.
+        """
         since_s = (self._formation.closing_s(now_ns) or 0.0) - _SETS_OUT_S
         if since_s <= 0:
             return None
@@ -205,8 +210,8 @@ class ConnectivityMaintenance:
         return next((node for left_m, node, _ in self._unheard(now_ns) if left_m <= near_m), None)
 
     def _unheard(self, now_ns: int) -> list[tuple[float, int, Motion]]:
-        """Those to whom this UAV is tied and whom it does not hear while ranks are closed, each with its motion before
-        the loss and how far away that is.
+        """The UAVs to which this one is tied and which it does not hear while ranks are closed: how far each would be
+        without the loss, its node, and the motion that it would have.
         """
         plan, pattern, place = self._formation.plan, self._formation.pattern, self._formation.place
         closing_s, swept_s = self._formation.closing_s(now_ns), self._formation.swept_s(now_ns)
@@ -223,8 +228,8 @@ class ConnectivityMaintenance:
         return unheard
 
     def _parted(self, now_ns: int) -> Motion | None:
-        """The motion of a UAV of another part that this one seeks on the way to the places: the places are in reach of
-        each other, so a link lasts, and no neighbor is nearer to any such UAV. None once it is heard in reach.
+        """The motion of a UAV of another part that this one seeks on the way to the places, because their places are in
+        reach of each other, and no neighbor is nearer to such a UAV. None if there is none, or it is heard in reach.
         """
         place, pattern, plan = self._formation.place, self._formation.pattern, self._formation.plan
         ways = {} if place is None or self._bidding.is_absent(now_ns) else self._formation.parted_ways(now_ns)
@@ -254,8 +259,8 @@ class ConnectivityMaintenance:
         return heard[sought] or ways[sought]
 
     def _lasting(self, plan: Search, pattern: Pattern, place: int, now_ns: int) -> dict[NodeId, Motion]:
-        """Neighbors whose places are in reach of this UAV's; not one with whom a third has strong links to both, each
-        shorter. A link stretched on the way is drawn in again: given up there, it would be when it matters most.
+        """The neighbors whose places are in reach of this UAV's, but those that a third UAV connects with it by two
+        strong and shorter links. A link that is too long now counts as well, because it is drawn in again.
         """
         swept_s, place_of = self._formation.swept_s(now_ns) or 0.0, {node: at for at, node in enumerate(plan.nodes)}
         present = {node: motion for node, motion in self._present(now_ns).items() if node in place_of}
@@ -273,24 +278,27 @@ class ConnectivityMaintenance:
         return {node: present[node] for node in lasting if not is_spared(node)}
 
     def _nearest_motions(self, now_ns: int) -> dict[NodeId, Motion]:
+        """The nearest neighbors (`_EARLY_TIES`)."""
         here, present = self._own_motion.position, self._present(now_ns)
         nearest = sorted(present, key=lambda node: present[node].offset_from(here, now_ns).norm())
         return {node: present[node] for node in nearest[:_EARLY_TIES]}
 
     def _present(self, now_ns: int) -> dict[NodeId, Motion]:
-        """The neighbors but those that may have left the others for a survivor."""
+        """The neighbors without those that may have left the formation for a survivor."""
         absent = self._bidding.responders(now_ns) if self._bidding.may_be_absent else ()
         return {NodeId(node): motion for node, motion in self._neighbors.by_node(now_ns=now_ns) if node not in absent}
 
     def _tied_to(self, pattern: Pattern, place: int, now_ns: int) -> tuple[int, ...]:
-        """Places in whose reach this UAV stays: tied ones, past one that may leave; else its team's nearest UAV."""
+        """The places in whose reach this UAV stays: those to which its place is tied; if its place may be left, that of
+        the nearest UAV of its team.
+        """
         swept_s = self._formation.swept_s(now_ns) or 0.0
         if pattern.may_leave(place, swept_s):
             return self._nearest(pattern.line(place), now_ns)
         return pattern.tethers(place, swept_s)
 
     def _nearest(self, places: range, now_ns: int) -> tuple[int, ...]:
-        """Of these places, the one whose holder is nearest to this UAV; empty if no holder was received recently."""
+        """Of these places the one whose UAV is nearest to this one; empty if none of their UAVs is a neighbor."""
         plan = self._formation.plan
         assert plan is not None, "who has a place has a plan"
         near = [
@@ -302,16 +310,16 @@ class ConnectivityMaintenance:
 
 
 def _longest_m(a: tuple[Enu, Enu], b: tuple[Enu, Enu]) -> float:
-    """The distance of two UAVs, each given by its position and its place, or of their places if that is greater."""
+    """The distance of two UAVs, each given by its position and its place, or that of their places if it is greater."""
     return max(a[0].horizontal_to(b[0]), a[1].horizontal_to(b[1]))
 
 
 def tether_plane(
     offset: Enu, other_velocity: Velocity, *, tether_m: float, within_s: float, haste_m_s: float = math.inf
 ) -> HalfPlane | None:
-    """The half-plane of velocities that keep this UAV within `tether_m` of another for `within_s`; None if it needs
-    none. Each may use half of the distance that is left; without any this UAV alone makes up for it, at `haste_m_s` at
-    most.
+    """The half-plane of velocities that keep this UAV within `tether_m` of another for `within_s`; None if the other is
+    so near that it needs none. Each of both may use half of the distance that is left; if they are too far apart this
+    UAV makes up for that alone, at `haste_m_s` at most.
     """
     distance = offset.horizontal()
     if distance < 0.3 * tether_m:

@@ -9,8 +9,8 @@ from agents.mission.flight.return_home import HOME_HIGHER_M, ReturnHome
 from agents.mission.flight.take_off import TakeOff
 from agents.mission.flight.velocity_choice import VelocityChoice
 from agents.mission.navigation.own_motion import OwnMotion
-from agents.mission.search_formation.formation_place import FormationPlace
 from agents.mission.search_formation.roll_call import MUTE_LEVELS, RollCall
+from agents.mission.search_formation.search_place import SearchPlace
 from fanet_mw.units import STILL, Enu, NodeId
 
 _MUTE_LEVEL_M: Final = 8.0
@@ -28,7 +28,7 @@ class Flight:
     def __init__(
         self,
         own_motion: OwnMotion,
-        place: FormationPlace,
+        place: SearchPlace,
         goal: Goal,
         velocity_choice: VelocityChoice,
         connectivity: ConnectivityMaintenance,

@@ -5,7 +5,7 @@ from typing import Final
 from agents.mission.finding.known_survivors import KnownSurvivors
 from agents.mission.flight.errand import Errand
 from agents.mission.navigation.own_motion import OwnMotion
-from agents.mission.search_formation.formation_place import FormationPlace, along
+from agents.mission.search_formation.search_place import SearchPlace, along
 from agents.mission.tasking.absence import Absence
 from agents.mission.tasking.approach import Approach
 from agents.mission.tasking.bidding import FAR_M
@@ -23,7 +23,7 @@ class Goal:
         self,
         survivors: KnownSurvivors,
         own_motion: OwnMotion,
-        formation: FormationPlace,
+        formation: SearchPlace,
         approach: Approach,
         listening: VoiceDescent | None,
         errand: Errand | None = None,

@@ -6,10 +6,10 @@ from typing import Final
 from agents.mission.navigation.neighbor_motions import falls
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox, OutgoingPacket
-from agents.mission.search_formation.formation_place import FormationPlace
 from agents.mission.search_formation.formation_planner import STATUS_S, FormationPlanner
 from agents.mission.search_formation.pattern import Pattern
 from agents.mission.search_formation.roll_call import RollCall
+from agents.mission.search_formation.search_place import SearchPlace
 from fanet_mw.motion import Motion
 from fanet_mw.trace import Planned
 from fanet_mw.units import MS, US, NodeId, S
@@ -33,7 +33,7 @@ class PlanExchange:
         node: NodeId,
         planner: FormationPlanner,
         roll_call: RollCall,
-        place: FormationPlace,
+        place: SearchPlace,
         own_motion: OwnMotion,
         outbox: Outbox,
         *,

@@ -1,6 +1,6 @@
 """How far a UAV may go from its place for a survivor, out of the others' reach, as `mission.connection` says.
 
-always    not at all: it stays on the leash of its place (`search_formation/formation_place.py`); before the sweep it
+always    not at all: it stays on the leash of its place (`search_formation/search_place.py`); before the sweep it
           stays in reach of others, and near its way or so near to its place that it is there in time (`bidding.py`)
 t         so far that it can be within reach of its team again t seconds later, and tell what it has found; before the
           sweep, so far that it is at its place at most t seconds after the sweep begins
@@ -11,7 +11,7 @@ import math
 from typing import Final, Literal
 
 from agents.mission.finding.phone_localization import Estimate
-from agents.mission.search_formation.formation_place import FormationPlace
+from agents.mission.search_formation.search_place import SearchPlace
 from fanet_mw.units import Enu, S
 
 Connection = Literal["always", "none"] | float
@@ -23,7 +23,7 @@ _SPEED_SHARE: Final = 0.9
 class Absence:
     """The rule by which one UAV may be out of reach."""
 
-    def __init__(self, formation: FormationPlace, connection: Connection, *, speed_m_s: float) -> None:
+    def __init__(self, formation: SearchPlace, connection: Connection, *, speed_m_s: float) -> None:
         self._formation = formation
         self._most_s = {"always": 0.0, "none": math.inf}[connection] if isinstance(connection, str) else connection
         self._speed_m_s = _SPEED_SHARE * speed_m_s

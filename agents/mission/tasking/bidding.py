@@ -1,8 +1,9 @@
 """Decides for which survivors one UAV bids, and to which of those that it has won it flies.
 
-A survivor gets one responder at first, another one after 4 s for another bearing (all where UAVs may leave), and all
-that the scenario wants once enough UAVs have reported it; before the sweep a vague place gets twice as many. Who does
-not get there, or does not find the survivor, withdraws its bid after a while.
+A survivor gets one responder at first. After 4 s with too few reporters a second one is wanted, for another bearing, or
+all that the scenario wants (`mission.responders`) where UAVs may leave the formation. Once enough UAVs have reported
+the survivor, all are wanted; before the sweep a vague place gets twice as many. A responder that does not get there, or
+does not find the survivor, withdraws its bid after a while.
 """
 
 import math
@@ -13,7 +14,7 @@ from agents.mission.finding.known_survivors import KnownSurvivor, KnownSurvivors
 from agents.mission.finding.phone_localization import Estimate
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox
-from agents.mission.search_formation.formation_place import FormationPlace, along
+from agents.mission.search_formation.search_place import SearchPlace, along
 from agents.mission.tasking.absence import Absence
 from agents.mission.tasking.approach import Approach
 from agents.mission.tasking.auction import Auction
@@ -30,16 +31,19 @@ _SCOUT_AFTER_NS: Final = 4 * S
 _RETURN_AFTER_NS: Final = 45 * S
 """How long a responder searches for a survivor in vain before it withdraws its bid, without the time of a descent."""
 _OVERDUE_NS: Final = 15 * S
-"""How overdue a responder held back before the sweep withdraws its bid: soon all leave."""
+"""Before the sweep a responder that has not arrived so long after it should have withdraws its bid: its links hold it
+back, and soon all leave.
+"""
 _MEASURES_NS: Final = 30 * S
 """How long a responder is assumed to go round until a vague estimate has become a place."""
 _AGAIN_NS: Final = 20 * S
 """How long a UAV that has withdrawn its bid does not bid again."""
 _LONG_AGO_NS: Final = -(10**18)
+"""Stands for an instant that has never been."""
 _HANDOVER_S: Final = 15.0
 """The time that a responder is assumed to need at its present survivor."""
 _ASTRAY_M: Final = 100.0
-"""How far a UAV may be from its way before the sweep, or farther if it will be at its place in time."""
+"""Before the sweep a UAV may be so far from the straight way to its place; farther if it will be there in time."""
 _LATE_S: Final = 20.0
 """A UAV is in time if it is at its place at most so long after the sweep has begun: it catches up then."""
 _GLANCE_S: Final = 8.0
@@ -47,16 +51,17 @@ _GLANCE_S: Final = 8.0
 _LOOKS_S: Final = 15.0
 """How long a UAV that leaves the formation for a survivor is assumed to look there."""
 _PASSED_M: Final = 30.0
-"""A UAV of a team leaves it for a survivor who is this far behind its place: those ahead will be passed."""
+"""A UAV leaves its team for a survivor only who is this far behind its place: the team will pass those ahead."""
 _LEAVES_S: Final = 10.0
 """By how much later a UAV that would leave its team bids, so that one goes that is free."""
 _ABSENT: Final = 1
 """The number of UAVs that may leave the formation for a survivor."""
-_BEFORE_SWEEP: Final = 2
-"""So many times the responders may go to a vague place before the sweep, when UAVs have nothing else to do: powers from
-more places tell where it is."""
 _ABSENT_VAGUE: Final = 2
-"""The same where the powers do not tell the place yet: two that look on different sides need half the time."""
+"""The same where received powers do not tell the place yet: two that look on different sides need half the time."""
+_BEFORE_SWEEP: Final = 2
+"""Before the sweep, when UAVs have nothing else to do, a vague place gets this multiple of `mission.responders`: powers
+received in more places tell where it is.
+"""
 
 
 class Bidding:
@@ -69,7 +74,7 @@ class Bidding:
         *,
         survivors: KnownSurvivors,
         own_motion: OwnMotion,
-        formation: FormationPlace,
+        formation: SearchPlace,
         approach: Approach,
         absence: Absence,
         outbox: Outbox,
@@ -85,13 +90,18 @@ class Bidding:
         self._patience_ns = _RETURN_AFTER_NS + descent_ns(scenario)
         self._auction = Auction(node)
         self._taken_back_ns: dict[int, int] = {}
+        """The instant at which this UAV withdrew its bid for each survivor."""
         self._located: set[int] = set()
-        """The survivors of whom the trace contains that this UAV knows where they are."""
+        """The survivors whom this UAV has recorded as located."""
         self._announced = False
+        """Whether this UAV has recorded that it flies to its present survivor."""
         self.survivor: int | None = None
+        """The survivor to whom this UAV flies, or at whose place it is."""
         self._due_ns = _LONG_AGO_NS
+        """The instant at which it should have arrived there."""
 
     def merge(self, bids: Iterable[Bid], *, now_ns: int) -> None:
+        """Take in bids that another UAV passes on."""
         open_bids = (bid for bid in bids if not self._survivors.is_found(bid.survivor))
         self._auction.merge(open_bids, now_ns=now_ns)
 
@@ -106,7 +116,7 @@ class Bidding:
             self.choose(now_ns)
 
     def reopen(self, survivor: int) -> None:
-        """Treat a survivor as not visited yet, because its confirmation was taken back."""
+        """Treat a survivor as not visited yet, because a confirmation was taken back."""
         self._approach.forget(survivor)
 
     def hand_on(self, now_ns: int) -> None:
@@ -116,7 +126,9 @@ class Bidding:
         self.survivor = None
 
     def bid(self, now_ns: int, *, delay_s: float = 0.0) -> None:
-        """Bid where this UAV would win, if its place permits; `delay_s`: until it can leave, because it takes off."""
+        """Bid for survivors whom this UAV would win and whom its place in the formation permits; `delay_s`: until it
+        can leave, because it takes off.
+        """
         for survivor in self._survivors.sought():
             known = self._survivors.by_id[survivor]
             if not known.filter.near(self._own_motion.position, within_m=FAR_M):
@@ -133,7 +145,7 @@ class Bidding:
                 self._auction.bid(survivor, eta_s=eta_s, now_ns=now_ns)
 
     def choose(self, now_ns: int) -> None:
-        """Fly to the present survivor unless given up, otherwise to the nearest won; None if none is won."""
+        """Stay with the present survivor, or choose the nearest of those won; `survivor` is None if there is none."""
         if self.survivor is not None:
             self._reconsider(self.survivor, now_ns)
         if self.survivor is None:
@@ -157,8 +169,8 @@ class Bidding:
                 self._announce(self.survivor, now_ns)
 
     def _reconsider(self, survivor: int, now_ns: int) -> None:
-        """Give up the present survivor if the auction is lost and this UAV is not nearly there, it takes too long, or
-        it is not permitted any more; but for a lost auction the bid is withdrawn.
+        """Give up the present survivor if the auction is lost and this UAV is not nearly there. Give it up and withdraw
+        the bid if it takes too long, or is not permitted any more.
         """
         arrived_ns, patience_ns = self._approach.arrived_ns.get(survivor), self._patience_ns
         place = self._survivors.by_id[survivor].place()
@@ -175,7 +187,7 @@ class Bidding:
             self.survivor = None
 
     def _may_stay(self, survivor: int, now_ns: int) -> bool:
-        """True while this UAV may be with a survivor, by its place in the formation or because it may be absent."""
+        """True while this UAV may go on with a survivor, by its place in the formation or because it may be absent."""
         place = self._survivors.by_id[survivor].place()
         if self._is_within_limits(place, now_ns) or self._formation.finishes(place, now_ns):
             return True
@@ -184,7 +196,7 @@ class Bidding:
         return self._node in self._auction.winners(survivor, count=_absent(place), now_ns=now_ns)
 
     def _is_within_limits(self, place: Estimate | None, now_ns: int) -> bool:
-        """True while this UAV may be at a survivor's place without leaving the formation."""
+        """True while this UAV may go on to a survivor's place without leaving the formation."""
         formation, here = self._formation, self._own_motion.position
         if not formation.is_taken_up(now_ns):
             near = formation.lane(now_ns)[0].horizontal_to(here) <= _ASTRAY_M
@@ -194,8 +206,8 @@ class Bidding:
         return formation.leads_by(place, *formation.lane(now_ns))
 
     def _may_look(self, place: Estimate | None, lane: Enu, moves: Enu) -> bool:
-        """True if a UAV of a team may go to a place without leaving the formation: to a vague one while it is ahead, or
-        the team rests. Who is on the way there may look around behind, too.
+        """True if a UAV of a team may set out for an estimated place without leaving the formation: to a vague one only
+        while it is ahead, or while the team rests.
         """
         if place is None or not self._formation.leads_by(place, lane, moves):
             return False
@@ -203,7 +215,9 @@ class Bidding:
         return not place.is_vague or ahead_m > 0 or moves == STILL
 
     def _is_in_time(self, at: Enu, now_ns: int, *, after_s: float = 0.0) -> bool:
-        """True if this UAV has a plan, and is at its place in time (`_LATE_S`) if it leaves a position then."""
+        """True if this UAV has a plan, and would be at its place in time (`_LATE_S`) if it left the position `at` in
+        `after_s`.
+        """
         has_plan = self._formation.plan is not None
         return has_plan and self._absence.late_s(at, now_ns, after_s=after_s) <= _LATE_S
 
@@ -232,6 +246,7 @@ class Bidding:
         return self.survivor is not None and self._winners(self.survivor, now_ns)[:1] == [self._node]
 
     def _announce(self, survivor: int, now_ns: int) -> None:
+        """Record that this UAV flies to a survivor, if it has an estimate of the place."""
         known = self._survivors.by_id[survivor]
         place = known.place()
         if place is None:
@@ -241,6 +256,7 @@ class Bidding:
         self._outbox.records.append(Approaching(now_ns, self._node, survivor, len(known.reporters), east_m, north_m))
 
     def _note_place(self, survivor: int, known: KnownSurvivor, now_ns: int) -> None:
+        """Record that a survivor is located, once the estimate of the place is not vague."""
         place = None if survivor in self._located else known.place()
         if place is not None and not place.is_vague:
             self._located.add(survivor)
@@ -250,7 +266,7 @@ class Bidding:
 
     def _wanted(self, known: KnownSurvivor, now_ns: int) -> int:
         """The number of UAVs that a survivor needs now."""
-        is_near = known.filter.near(self._own_motion.position, within_m=FAR_M)  # who is far need not know the place
+        is_near = known.filter.near(self._own_motion.position, within_m=FAR_M)  # a place far away is not computed
         if is_near and not self._formation.is_taken_up(now_ns):
             place = known.place()
             if place is None or place.is_vague:
@@ -262,6 +278,7 @@ class Bidding:
         return self._config.responders if self._absence.is_permitted else min(self._config.responders, 2)
 
     def _winners(self, survivor: int, now_ns: int) -> list[int]:
+        """The UAVs that are to fly to a survivor, as far as this one knows, the earliest arrival first."""
         wanted = self._wanted(self._survivors.by_id[survivor], now_ns)
         return self._auction.winners(survivor, count=wanted, now_ns=now_ns)
 
@@ -270,7 +287,7 @@ class Bidding:
         return math.inf if place is None else place.distance_m(self._own_motion.position)
 
     def _eta_s(self, survivor: int, delay_s: float, now_ns: int) -> float | None:
-        """The time to a survivor; None if this UAV's place in the formation does not permit that."""
+        """The time with which this UAV bids for a survivor; None if its place in the formation does not permit that."""
         formation, here = self._formation, self._own_motion.position
         place = self._survivors.by_id[survivor].place()
         if place is None:
@@ -292,7 +309,7 @@ class Bidding:
         if self._may_look(place, lane, moves):
             ahead_m, _ = along(moves, place.east_m - here.east, place.north_m - here.north)
             return max(eta_s, abs(ahead_m) / self._cruise_m_s) if moves.norm() else eta_s
-        if not formation.is_near(now_ns) and formation.finishes(place, now_ns):  # it passes him on the way to its lane
+        if not formation.is_near(now_ns) and formation.finishes(place, now_ns):  # it is on the way back to its lane
             return eta_s
         if leaves and formation.searches and ahead_m < -_PASSED_M and formation.can_be_spared(now_ns):
             return eta_s + _LEAVES_S

@@ -1,8 +1,7 @@
-"""The geofence of the world: no setpoint takes a UAV out of the area and the margin around it.
+"""The geofence of the world, a rectangle `FENCE_M` outside the area, and what setpoints can do about it.
 
-A position is clipped to the area. A velocity is limited so that the UAV can brake before it reaches the geofence, which
-lies `FENCE_M` outside the area; with `mobility.geofence = "return"` it is not limited, and a UAV beyond the geofence
-flies home.
+A position setpoint is clipped to the area. A velocity setpoint is limited so that the UAV can brake before it reaches
+the geofence; with `mobility.geofence = "return"` it is not limited, and a UAV that is beyond the geofence flies home.
 """
 
 from typing import Final
@@ -15,15 +14,15 @@ from sim.world.arrays import Flags, Rows
 from sim.world.environment.layout import positions
 
 FENCE_M: Final = 50.0
-"""The distance of the geofence from the area; a UAV with a velocity setpoint brakes before it reaches the geofence."""
+"""The distance of the geofence from the area."""
 FLOOR_M: Final = 5.0
 """A position or take-off setpoint below this height is raised to it."""
 CEILING_M: Final = 1000.0
-"""A position above this height is lowered to it."""
+"""A position or take-off setpoint above this height is lowered to it."""
 BRAKE_M_S2: Final = 2.5
 """The deceleration with which braking is planned: half of what a UAV can do, because it reacts with a lag."""
 HOLD_M_S: Final = 5.0
-"""The greatest speed at which a UAV that was moved away from the position it holds comes back to it."""
+"""The greatest speed at which a UAV comes back to the position that it holds, or back inside the geofence."""
 
 
 def fence_of(scenario: Scenario) -> "Geofence":
@@ -32,8 +31,8 @@ def fence_of(scenario: Scenario) -> "Geofence":
 
 
 class Geofence:
-    """The area of a swarm, and the fence around it; UAVs that command themselves and start outside have theirs around
-    their starts.
+    """The area of a swarm and the geofence around it. Where UAVs command themselves (`mobility.model = "onboard"`) the
+    area reaches as far as their starts.
     """
 
     def __init__(self, scenario: Scenario, starts: Rows) -> None:
@@ -44,11 +43,11 @@ class Geofence:
 
     @property
     def reach_m(self) -> tuple[float, float]:
-        """How far to the east and north of the middle, and to the west and south, the geofence lies."""
+        """How far the geofence lies from the middle of the area, to the east and west, and to the north and south."""
         return self._half_east_m + FENCE_M, self._half_north_m + FENCE_M
 
     def clipped(self, place: Enu) -> Enu:
-        """The place in the area that is nearest to a place."""
+        """The place in the area, and between `FLOOR_M` and `CEILING_M`, that is nearest to a place."""
         return Enu(
             max(-self._half_east_m, min(self._half_east_m, place.east)),
             max(-self._half_north_m, min(self._half_north_m, place.north)),
@@ -60,7 +59,9 @@ class Geofence:
         return np.asarray((np.abs(at[:, :2]) > self.reach_m).any(axis=1))
 
     def brake(self, wish: Rows, at: Rows) -> Rows:
-        """Velocities limited so that each UAV can brake before the geofence; a UAV beyond it is brought back."""
+        """The wished velocities, limited so that each UAV can brake before the geofence; a UAV beyond it is brought
+        back.
+        """
         limited = wish.copy()
         for axis, half in ((0, self._half_east_m), (1, self._half_north_m)):
             outwards = np.copysign(1.0, at[:, axis])

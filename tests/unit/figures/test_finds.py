@@ -13,7 +13,7 @@ from sim.report import finds
 from sim.report.html import Rows, as_html
 from sim.report.run_records import RunRecords
 from sim.results.files import finish
-from sim.results.mission import Confirmations, OverflownCells
+from sim.results.mission import Confirmations, CoveredCells
 from sim.results.outcome import Outcome
 from sim.results.run_folder import RunFolder
 
@@ -127,7 +127,7 @@ def test_what_is_not_searched_is_told_by_piece(make_scenario: MakeScenario) -> N
     line = [Posed(second * S, 1, -500.0 + 10 * second, -250.0, 60.0) for second in range(101)]
     run = run_of(make_scenario, *line)
     share, pieces = finds.unsearched(run)
-    cells = OverflownCells(run.scenario)
+    cells = CoveredCells(run.scenario)
     cells.add((one.east_m, one.north_m, one.up_m) for one in line)
     assert share == pytest.approx(1 - cells.share)
     assert sum(piece.area_m2 for piece in pieces) == pytest.approx(share * 1e6)

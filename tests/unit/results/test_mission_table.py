@@ -27,7 +27,7 @@ from fanet_mw.trace import (
 )
 from fanet_mw.units import Enu, NodeId, S
 from fanet_mw.wire.survivors import person_id
-from sim.results.mission import Confirmations, OverflownCells, PhotographedCells, mission
+from sim.results.mission import Confirmations, CoveredCells, PhotographedCells, mission
 from sim.world.sensors.phone import REFERENCE_LOSS_DB
 
 TRUTH = (Enu(100, 60, 0), Enu(-100, -20, 0), Enu(30, -150, 0))
@@ -224,7 +224,7 @@ def test_since_when_nearly_all_is_covered_is_the_first_instant_of_95_percent() -
     narrow = {"mission": {**KEYS["mission"], "phone_power_dbm": 15.0, "detection_dbm": -80.0}}
     scenario = Scenario(**{**KEYS, **narrow})
     flown = [(x, y) for y in range(-240, 250, 40) for x in range(-240, 250, 40)]
-    cells, since_s = OverflownCells(scenario), None
+    cells, since_s = CoveredCells(scenario), None
     records: list[Record] = []
     for index, at in enumerate(flown):
         t_s = 1 + index / 7
@@ -247,7 +247,7 @@ def test_a_cell_is_flown_over_if_a_phone_in_its_middle_is_received(
 ) -> None:
     scenario = Scenario(**{**KEYS, "world": {"area_m": area_m}, "mission": {"survivors": 0}})
     told = scenario.mission
-    cells = OverflownCells(scenario)
+    cells = CoveredCells(scenario)
     cells.add(at)
     expected = []
     for north in middles(area_m):

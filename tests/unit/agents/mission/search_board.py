@@ -12,9 +12,9 @@ from agents.mission.navigation.neighbor_motions import NeighborMotions
 from agents.mission.navigation.onboard_map import NO_MAP
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox
-from agents.mission.search_formation.formation_place import FormationPlace
 from agents.mission.search_formation.formation_planner import plan_of
 from agents.mission.search_formation.pattern import fitted
+from agents.mission.search_formation.search_place import SearchPlace
 from agents.mission.search_formation.shapes.contract import Demands
 from agents.mission.tasking.absence import Absence, Connection
 from agents.mission.tasking.approach import Approach
@@ -60,7 +60,7 @@ class Board:
         self.out = Outbox()
         self.survivors = KnownSurvivors(MODEL)
         self.own_motion, self.neighbors = OwnMotion(at, OPEN), NeighborMotions()
-        self.place = FormationPlace(node, self.own_motion, reach_m=REACH_M)
+        self.place = SearchPlace(node, self.own_motion, reach_m=REACH_M)
         if plan is not None:
             self.place.adopt(plan, 0)
         self.approach = Approach(
@@ -86,6 +86,6 @@ class Board:
 
 
 def lane_of(node: int, at_ns: int) -> Enu:
-    place = FormationPlace(NodeId(node), OwnMotion(Enu(0, 0, UP_M), OPEN), reach_m=REACH_M)
+    place = SearchPlace(NodeId(node), OwnMotion(Enu(0, 0, UP_M), OPEN), reach_m=REACH_M)
     place.adopt(PLAN, 0)
     return place.lane(at_ns)[0]

@@ -8,10 +8,10 @@ from search_board import COUNT, LINE, OPEN, PLAN, REACH_M, TAKEN_UP_NS, lane_of
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.navigation.silent_neighbors import SilentNeighbors
 from agents.mission.outbox import Outbox
-from agents.mission.search_formation.formation_place import FormationPlace
 from agents.mission.search_formation.formation_planner import STATUS_S, FormationPlanner
 from agents.mission.search_formation.plan_exchange import PlanExchange
 from agents.mission.search_formation.roll_call import RollCall
+from agents.mission.search_formation.search_place import SearchPlace
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.motion import Motion
 from fanet_mw.units import MS, STILL, US, Enu, NodeId, S
@@ -28,7 +28,7 @@ class Exchange:
     def __init__(self, node: NodeId, *, waits: float = 0.5, silent: SilentNeighbors | None = None) -> None:
         """`waits`: all its random numbers."""
         self.out, self.motion = Outbox(), OwnMotion(lane_of(node, NOW_NS), OPEN)
-        self.place = FormationPlace(node, self.motion, reach_m=REACH_M)
+        self.place = SearchPlace(node, self.motion, reach_m=REACH_M)
         roll_call = RollCall(node, hello_interval_s=1.0, silent=silent)
         planner = FormationPlanner(
             node, roll_call, expected=COUNT, deploy_speed_m_s=9.0,

@@ -19,7 +19,9 @@ from fanet_mw.wire.search_plan import Search
 _FREE_REACH: Final = 0.84
 """A follower stays within this share of the radio's reach from its team."""
 _ASIDE_M: Final = 70.0
-"""A UAV of a team examines a survivor at most so far aside of what `_LEASH_M` permits, or less far by its camera."""
+"""A UAV of a team examines a survivor at most so far to the side from where `_LEASH_M` lets it fly; less far if its
+camera shows less.
+"""
 _LOOK_SHARE: Final = 0.9
 """The share of its view to the side that a UAV relies on."""
 _AHEAD_M: Final = 350.0
@@ -33,24 +35,24 @@ _LAG_M: Final = 140.0
 rests.
 """
 _NEARLY_M: Final = 120.0
-"""In the sweep a UAV may fly to a survivor whose estimate is this near to it and not vague."""
+"""In the sweep a UAV finishes its flight to a survivor whose estimate is this near to it and not vague, even if it has
+lost the auction meanwhile.
+"""
 _ENDS_M: Final = 200.0
 """It does so while it is at most this far from its own place: its row waits for it, or closes ranks without it."""
 _COMES_M: Final = 300.0
 """The same distance until all have settled: a UAV may still be on its way to its place."""
 _SETTLED_NS: Final = 20 * S
 """So long after the sweep has begun everybody is taken to be at its place."""
-
-
 _CLOSES_S: Final = 15.0
 """The time within which ranks are closed."""
 _APART_S: Final = 40.0
-"""So long after a loss those farther from the gap follow those nearer to it, while the swarm is apart."""
+"""For so long after a loss, while the swarm is apart, a UAV follows a neighbor fewer ties away from another part."""
 _FLOWN_NS: Final = 8 * S
 """So long after they began to close ranks most UAVs are at their new places."""
 
 
-class FormationPlace:
+class SearchPlace:
     """The place of one UAV in the plan that it follows."""
 
     def __init__(self, node: NodeId, own_motion: OwnMotion, *, reach_m: float, look_m: float = math.inf) -> None:
@@ -67,24 +69,28 @@ class FormationPlace:
         self._left_ns = 0
         """The instant at which it leaves that position."""
         self._gaps: frozenset[int] = frozenset()
+        """The places of lost UAVs."""
         self._parted: Collection[int] = ()
         """The UAVs of another part of the swarm, out of reach and not lost."""
         self.sought: Collection[int] = ()
-        """The same, or who was that lately, while ranks are closed: by chance links parts meet, and lose each other."""
+        """The same; while ranks are closed also the latest ones, if none is out of reach now, because parts that meet
+        by a chance link may lose each other again.
+        """
         self._seen: dict[int, tuple[Enu, int]] = {}
         """Where each other UAV was, by its latest hello or status, and when."""
         self._closing_ns = 0
-        """The instant at which the last of them was lost."""
+        """The instant at which this UAV learned of the latest loss."""
         self._lost_at: dict[int, Enu] = {}
         """Where each UAV lost in the sweep was due when this one learned of it, above ground."""
         self._hops: Mapping[int, int] = {}
         """How many ties lead from each place to the nearest one of another part."""
         self._before: Pattern | None = None
-        """The formation until then, if all had time to take it up."""
+        """The last formation before a loss that all had time to take up."""
         self._changed_ns = -_FLOWN_NS
-        """The instant at which the others began to close ranks the last time, or to open them."""
+        """The instant at which the UAVs began to close ranks the last time, or to open them."""
 
     def adopt(self, plan: Search, now_ns: int) -> None:
+        """Follow a plan from now on."""
         made, before = pattern_of(plan, reach_m=self._reach_m), self.pattern
         first = self.place is None or before is None or before.dimensions != made.dimensions
         self.plan, self.pattern = plan, made
@@ -96,7 +102,9 @@ class FormationPlace:
     def close_ranks(
         self, lost: Collection[int], now_ns: int, *, away: Collection[int] = (), parted: Collection[int] = ()
     ) -> None:
-        """Fly on without these: `away` left without urgency; `parted` are in another part, and not lost."""
+        """Fly on without the lost UAVs and without those that left the search (`away`), for whom nobody hurries;
+        `parted`: those in another part of the swarm, which are not lost.
+        """
         if self.plan is None or self.pattern is None:
             return
         vacant = frozenset(
@@ -127,21 +135,23 @@ class FormationPlace:
             self.pattern, self._changed_ns = self.pattern.closed(vacant), now_ns
 
     def lost_at(self, now_ns: int) -> Mapping[int, Enu]:
-        """The places of the UAVs lost in the sweep, as they were then. The ground there is taken to be as high as that
-        below this UAV.
+        """Where the UAVs lost in the sweep should have been then. The ground there is taken to be as high as that below
+        this UAV.
         """
         rise_m = self._own_motion.position.up - self._own_motion.height_m(now_ns)
         return {node: at._replace(up=at.up + rise_m) for node, at in self._lost_at.items()}
 
     def closing_s(self, now_ns: int) -> float | None:
-        """How long this row has been closing ranks over the last one lost; None if it is not, or has done."""
+        """How long the row of this UAV has been closing ranks since the latest loss; None if it does not, or has."""
         since_s = (now_ns - self._closing_ns) / S
         if self.pattern is None or self.place is None or not self._gaps or since_s > _CLOSES_S:
             return None
         return since_s if self.pattern.has_beside(self.place, self._gaps) else None
 
     def leads_to_gap(self, node: int, now_ns: int) -> bool:
-        """True for a UAV that is fewer ties from another part than this one, while ranks are closed."""
+        """True, for some time after a loss, for a UAV whose place is fewer ties from another part of the swarm than the
+        place of this one.
+        """
         plan, hops = self.plan, self._hops
         if plan is None or now_ns - self._closing_ns > _APART_S * S:
             return False
@@ -150,8 +160,8 @@ class FormationPlace:
 
     @property
     def passes_above(self) -> bool:
-        """True for a UAV that must fly above its place: those beyond a gap, who do not hear it, may take it for lost
-        and fly here to close the same gap. Those on one side of it give way.
+        """True for a UAV that must fly above its place, because UAVs beyond a gap that do not hear it may take it for
+        lost and fly to its place. Only those on one side of a gap do so.
         """
         if self.pattern is None or self.place is None or not self._gaps:
             return False
@@ -159,13 +169,13 @@ class FormationPlace:
         return is_above and size > (0 if self._parted else 1)
 
     def known_at(self, place: int, swept_s: float) -> tuple[Enu, Enu]:
-        """Where the UAV of a place would fly if the last one were not lost, and how: there it is sought."""
+        """The position and velocity that the UAV of a place would have without the latest loss: there it is sought."""
         pattern = self._before or self.pattern
         assert pattern is not None, "who seeks others has a plan"
         return pattern.at(place, swept_s), pattern.velocity(place, swept_s)
 
     def see(self, node: int, position: Enu, at_ns: int) -> None:
-        """Another UAV was here then, by what it says."""
+        """Another UAV has said that it was at a position at an instant."""
         if at_ns >= self._seen.get(node, (position, at_ns))[1]:
             self._seen[node] = position, at_ns
 
@@ -174,7 +184,7 @@ class FormationPlace:
         return self._seen[node][0] if node in self._seen else None
 
     def parted_ways(self, now_ns: int) -> dict[int, Motion]:
-        """The places of the UAVs of another part before the sweep, and where these are likely to be on their way."""
+        """Before the sweep: the likely motion of each UAV of another part on the way to its place, by that place."""
         plan, pattern, ways = self.plan, self.pattern, dict[int, Motion]()
         if plan is None or pattern is None or self.is_taken_up(now_ns):
             return ways
@@ -187,6 +197,7 @@ class FormationPlace:
         return ways
 
     def depart(self, now_ns: int) -> None:
+        """Set out for the place from where this UAV is, when the plan begins."""
         begins_ns = now_ns if self.plan is None else self.plan.start_us * US
         self._left_from, self._left_ns = self._own_motion.over_ground(now_ns), max(now_ns, begins_ns)
 
@@ -215,7 +226,9 @@ class FormationPlace:
         return self.is_taken_up(now_ns - _SETTLED_NS)
 
     def lane(self, now_ns: int) -> tuple[Enu, Enu]:
-        """Where the plan has the UAV now, above ground, and that velocity; before the sweep on its way there."""
+        """Where the plan wants this UAV now, at its height above ground, and with which velocity; before the sweep that
+        is on the way to its place.
+        """
         plan, pattern, place = self.plan, self.pattern, self.place
         if plan is None or pattern is None or place is None:
             return self._left_from or self._own_motion.over_ground(now_ns), STILL
@@ -237,7 +250,7 @@ class FormationPlace:
         return abs(aside_m) <= _LEASH_M + self._aside_m and -_LAG_M <= ahead_m <= _AHEAD_M
 
     def finishes(self, estimate: Estimate | None, now_ns: int) -> bool:
-        """True in the sweep for a UAV that nearly is where a survivor is placed, and not yet far from its own place."""
+        """True in the sweep if this UAV is nearly at the place of a survivor, and not too far from its own place."""
         here = self._own_motion.position
         if estimate is None or estimate.is_vague or not self.is_taken_up(now_ns):
             return False
@@ -254,7 +267,9 @@ class FormationPlace:
         return abs(aside_m) <= _LEASH_M and abs(ahead_m) <= _LAG_M
 
     def strays(self, now_ns: int) -> bool:
-        """True for a UAV too far away to hold its row together: it left for somebody, or comes late."""
+        """True in the sweep for a UAV of a team that is too far from its place to hold its row together, if the swarm
+        can do without that place: it left for a survivor, or comes late.
+        """
         return self.searches and self.is_taken_up(now_ns) and self.is_free(now_ns) and not self.is_near(now_ns)
 
     def can_be_spared(self, now_ns: int) -> bool:
@@ -269,7 +284,9 @@ class FormationPlace:
         )
 
     def misses_m(self, estimate: Estimate, lane: Enu, moves: Enu, now_ns: int) -> float:
-        """How far this UAV must stay from an estimated place; 0 if it gets there, or its lane turns yet."""
+        """How far from an estimated place this UAV must stop, because it may not leave its own; 0 if it gets there, or
+        if lanes turn, so that it may come nearer later.
+        """
         if self.is_free(now_ns) or self.pattern is None or self.pattern.dimensions.turns:
             return 0.0
         if moves == STILL:
@@ -280,8 +297,8 @@ class FormationPlace:
     def bounded(
         self, east: float, north: float, lane: Enu, moves: Enu, now_ns: int, *, leads: bool = False
     ) -> tuple[Enu, Enu]:
-        """The position nearest to a point at which this UAV may be, and the velocity of that position; `leads`: it may
-        be ahead of its place.
+        """The position nearest to a point at which this UAV may be, and the velocity of that position. `leads`: it may
+        be ahead of its place, whose position and velocity are `lane` and `moves`.
         """
         if self.is_free(now_ns):
             return Enu(east, north, lane.up), STILL
@@ -294,14 +311,16 @@ class FormationPlace:
         ahead_m, aside_m = along(moves, east - lane.east, north - lane.north)
         aside_m = max(-_LEASH_M, min(_LEASH_M, aside_m))
         most_m = _LEAD_M if leads else 0.0
-        if ahead_m >= most_m:  # still ahead: the line will bring the UAV there
+        if ahead_m >= most_m:  # it waits for its place to move there
             return _beside(lane, moves, most_m, aside_m), moves
         if ahead_m < -_LAG_M:
             return _beside(lane, moves, -_LAG_M, aside_m), moves
         return _beside(lane, moves, ahead_m, aside_m), STILL
 
     def holds_together(self, estimate: Estimate | None, now_ns: int, *, within_s: float) -> bool:
-        """True if a UAV at a survivor would be within reach of this UAV's team `within_s` from now, and 5 s later."""
+        """True if a UAV at an estimated place would be in reach of the team of this UAV `within_s` from now and 5 s
+        later.
+        """
         return estimate is not None and self.keeps_line(estimate.east_m, estimate.north_m, now_ns, within_s=within_s)
 
     def keeps_line(self, east_m: float, north_m: float, now_ns: int, *, within_s: float) -> bool:
@@ -316,7 +335,7 @@ class FormationPlace:
         )
 
     def beyond_reception_m(self, east_m: float, north_m: float, now_ns: int) -> float:
-        """How far a position is from where the team receives it; without a plan, from where this UAV waits."""
+        """How far a position is out of reach of this UAV's team; before the sweep, of where the plan wants this UAV."""
         pattern, place, at_s = self.pattern, self.place, self.swept_s(now_ns)
         if pattern is None or place is None or at_s is None:
             lane, _ = self.lane(now_ns)
@@ -358,7 +377,7 @@ def _beside(lane: Enu, moves: Enu, ahead_m: float, aside_m: float) -> Enu:
 
 
 def _on_way(start: Enu, goal: Enu, *, from_ns: int, to_ns: int, now_ns: int) -> tuple[Enu, Enu]:
-    """The position and velocity of who flies straight to a place, so as to be there at an instant."""
+    """The position and velocity of a UAV that flies straight from `start` to `goal`, to be there at `to_ns`."""
     span_ns = to_ns - from_ns
     if now_ns <= from_ns or span_ns <= 0:
         return start, STILL
@@ -370,4 +389,5 @@ def _on_way(start: Enu, goal: Enu, *, from_ns: int, to_ns: int, now_ns: int) -> 
 
 
 def _taken_up_ns(plan: Search) -> int:
+    """The instant at which all UAVs have had time to fly to their places, and the sweep begins."""
     return plan.start_us * US + plan.deploy_ds * 100 * MS

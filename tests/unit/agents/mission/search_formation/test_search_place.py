@@ -1,4 +1,4 @@
-"""The place of a UAV in the formation: taking it up, staying near it."""
+"""The place of a UAV in the formation of a search: taking it up, staying near it."""
 
 from collections.abc import Collection
 

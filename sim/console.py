@@ -1,5 +1,6 @@
 """Prints for people, and ends a command quietly if its reader has gone, as in `fanet ... | head`."""
 
+import io
 import os
 import sys
 from collections.abc import Iterable, Sequence
@@ -84,6 +85,13 @@ def open_closed_streams() -> None:
             setattr(sys, name, os.fdopen(number, "r" if number == 0 else "w", closefd=False))
     if "stdout" in closed:
         sys.stderr.write("fanet: standard output is closed: what would be printed there is lost\n")
+
+
+def escape_what_has_no_code() -> None:
+    """Let a character that the encoding of the locale does not know (`LC_ALL=C`) be printed by its number."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
 
 
 def nobody_reads() -> NoReturn:

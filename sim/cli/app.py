@@ -31,7 +31,7 @@ from sim.cli import (
 )
 from sim.cli.memory import require_for
 from sim.cli.options import OPTIONS, RUN, RUNNING, SCENARIO, SERVICE, STUDY, TOOLS
-from sim.console import Console, discard_output, nobody_reads, open_closed_streams, printable
+from sim.console import Console, discard_output, escape_what_has_no_code, nobody_reads, open_closed_streams, printable
 
 app = App(
     name="fanet",
@@ -130,6 +130,7 @@ def _interrupted(interrupt: KeyboardInterrupt) -> int:
 def main() -> None:
     interrupts.install()
     open_closed_streams()
+    escape_what_has_no_code()
     if sys.flags.optimize >= 2 and (not sys.argv[1:] or "--help" in sys.argv or "-h" in sys.argv):
         sys.stderr.write("fanet: python -OO has removed what the commands and options mean; without -OO it is shown\n")
     try:

@@ -93,7 +93,7 @@ def show(
 
     chosen = choice.scenario(scenario)
     tree = departures(chosen) if changed else chosen.model_dump(mode="json", exclude_none=True)
-    sys.stdout.write(json.dumps(tree, indent=2) + "\n" if json_ else tomli_w.dumps(tree))
+    sys.stdout.write(json.dumps(tree, indent=2) + "\n" if json_ else _encodable(tomli_w.dumps(tree)))
     return 0
 
 
@@ -137,6 +137,13 @@ def _sentence(scenario: "Scenario") -> str:
         f"{', a post on the ground' if scenario.post else ''}, {scenario.duration_s:g} s, "
         f"{protocol}, seed {scenario.seed}"
     )
+
+
+def _encodable(toml: str) -> str:
+    """TOML is UTF-8: what an output of another encoding cannot hold is escaped in it."""
+    if sys.stdout.encoding.lower() in {"utf-8", "utf8"}:
+        return toml
+    return "".join(c if c.isascii() else f"\\U{ord(c):08x}" for c in toml)
 
 
 def _schema_text() -> str:

@@ -47,6 +47,21 @@ def test_from_init_over_check_to_show(tmp_path: Path, capsys: pytest.CaptureFixt
     assert "hop_limit" not in file.read_text()
 
 
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
+def test_a_locale_without_the_letters_of_a_scenario_costs_none_of_them(tmp_path: Path, encoding: str) -> None:
+    """`LC_ALL=C` ended `fanet check` and `fanet show` in a traceback; in Latin-1 what was shown was no TOML."""
+    file = tmp_path / "größe.toml"
+    file.write_text('description = "Größe Ω \U0001f681"\nduration_s = 3\n', encoding="utf-8")
+
+    def said(*words: str) -> bytes:
+        command = [sys.executable, "-m", "sim", *words, str(file)]
+        environment = os.environ | {"PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"}
+        return subprocess.run(command, env=environment, check=True, capture_output=True, timeout=60).stdout
+
+    assert b"is right: 45 nodes" in said("check")
+    assert tomllib.loads(said("show").decode("utf-8"))["description"] == "Größe Ω \U0001f681"
+
+
 def test_init_starts_from_a_file_that_names_others_beside_it(tmp_path: Path) -> None:
     """It said that such keys are read with a scenario file only, which it was."""
     (tmp_path / "load.csv").write_text("0,100\n1,200\n")

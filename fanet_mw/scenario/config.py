@@ -42,12 +42,17 @@ def parse(text: str, *, source: str, name: str, overrides: Iterable[str] = (), f
     """
     tree = toml_of(text, source=source)
     tree.setdefault("name", name)
-    if folder is not None:
-        _from_folder(tree, folder)
+    laid_about = None if folder is None else _from_folder(tree, folder)
     if isinstance(overrides, str) or not isinstance(overrides, Iterable):
         raise ConfigError(f"overrides = {overrides!r}: must be a sequence of KEY=VALUE, not one text")
     for override in overrides:
         apply_override(tree, override)
+    world = tree.get("world")
+    if laid_about is not None and isinstance(world, dict) and map_files.origin_of(world) != laid_about:
+        raise ConfigError(
+            f"{source}: --set changes world.origin_deg, but its area, no-fly areas or people of other files are laid "
+            f"about [{laid_about[0]:g}, {laid_about[1]:g}]; change it in the file"
+        )
     return build(tree, source=source)
 
 
@@ -83,19 +88,19 @@ def departures(scenario: Scenario) -> dict[str, Any]:
     return tree
 
 
-def _from_folder(tree: dict[str, Any], folder: Path) -> None:
-    """Make the paths of other files in a tree absolute, taken from a folder."""
+def _from_folder(tree: dict[str, Any], folder: Path) -> tuple[float, float] | None:
+    """Make the paths of other files in a tree absolute, taken from a folder; returns the origin of places on earth."""
     traffic = tree.get("traffic")
     for number, table in enumerate(traffic if isinstance(traffic, list) else [traffic]):
         if isinstance(table, dict) and isinstance(table.get("packets_csv"), str) and table["packets_csv"]:
             table["packets"] = packets_of(folder / table.pop("packets_csv"), key=f"traffic.{number}.packets_csv")
-    map_files.take_in(tree, folder)
+    laid_about = map_files.take_in(tree, folder)
     world = tree.get("world")
-    if not isinstance(world, dict):
-        return
-    for key in FILE_KEYS:
-        if isinstance(world.get(key), str) and world[key]:
-            world[key] = str(folder.absolute() / world[key])
+    if isinstance(world, dict):
+        for key in FILE_KEYS:
+            if isinstance(world.get(key), str) and world[key]:
+                world[key] = str(folder.absolute() / world[key])
+    return laid_about
 
 
 def _plain(key: str, value: object, problems: list[str], path: str) -> object:

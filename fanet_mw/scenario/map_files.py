@@ -22,6 +22,7 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.foreign_file import read_regular
 from fanet_mw.geodesy import Geodetic, to_enu, to_geodetic
 from fanet_mw.scenario.outlines import half_turn, require_degrees
+from fanet_mw.scenario.quantities import in_unit_of
 from fanet_mw.scenario.text_files import decoded
 from fanet_mw.units import Enu
 
@@ -30,6 +31,8 @@ _MOST_SHAPES: Final = 10_000
 _FARTHEST_M: Final = 1e6
 _ROUNDED_DEG: Final = 1e-6
 """Corners that are no farther than this from a line lie on it: 0.1 m."""
+_ROUNDED_M: Final = 1.0
+"""An area that reaches no farther than this beyond the square that is stated lies within it."""
 _Point = tuple[float, float]
 _WAYPOINT: Final = 16
 _FENCE_VERTICES: Final = {5001: True, 5002: False}
@@ -55,8 +58,13 @@ class Shapes(NamedTuple):
     """Why what stands for points is none; who asks for no points need not care."""
 
 
-def take_in(tree: dict[str, Any], folder: Path) -> None:
-    """Replace the keys of a scenario that name such files by what the files say; raises ConfigError."""
+def take_in(tree: dict[str, Any], folder: Path) -> tuple[float, float] | None:
+    """Replace the keys of a scenario that name such files by what the files say; raises ConfigError.
+
+    Returns the origin about which it is laid; None without such files.
+    """
+    if not all(isinstance(tree.get(table, {}), dict) for table in ("world", "mission")):
+        return None  # whoever checks the tables says so
     found = {}
     for table, key in _KEYS:
         within = tree.get(table)
@@ -64,34 +72,66 @@ def take_in(tree: dict[str, Any], folder: Path) -> None:
             path = folder / within.pop(key)
             found[key] = f"{table}.{key} = {path}", read(path, key=f"{table}.{key}")
     if not found:
-        return
+        return None
     world, mission = tree.setdefault("world", {}), tree.setdefault("mission", {})
     if "area" in found:
         said, shapes = found["area"]
         _take_area(world, said, shapes)
-    origin = world.get("origin_deg")
-    if not (isinstance(origin, list | tuple) and len(origin) == 2):
+    if "origin_deg" not in world:
         raise ConfigError(f"{next(iter(found.values()))[0]}: needs world.origin_deg, or mission.area, which says it")
+    origin = origin_of(world)
     if "no_fly" in found:
-        said, shapes = found["no_fly"]
-        circles = [
-            *(_around(ring, origin) for ring in shapes.outside),
-            *(_circle(one, origin) for one in shapes.circles),
-        ]
-        if not circles:
-            raise ConfigError(f"{said}: it holds no area to stay out of")
-        for east, north, _ in circles:
-            _require_near(said, (east, north), origin)
-        world["no_fly_m"] = [*world.get("no_fly_m", ()), *circles]
+        _take_no_fly(world, *found["no_fly"], origin)
     if "survivors_at" in found:
-        said, shapes = found["survivors_at"]
-        if shapes.no_points or not shapes.points:
-            raise ConfigError(f"{said}: {shapes.no_points or 'it holds no points'}")
-        places = [_flat(point, origin) for point in shapes.points]
-        for place in places:
-            _require_near(said, place, origin)
-        mission["survivor_positions_m"] = [[round(part, 2) for part in place] for place in places]
-        mission.setdefault("survivors", len(shapes.points))
+        _take_people(mission, *found["survivors_at"], origin)
+    return origin
+
+
+def _take_no_fly(world: dict[str, Any], said: str, shapes: Shapes, origin: _Point) -> None:
+    circles = [
+        *(_around(ring, origin) for ring in shapes.outside),
+        *(_circle(one, origin) for one in shapes.circles),
+    ]
+    if not circles:
+        raise ConfigError(f"{said}: it holds no area to stay out of")
+    for east, north, _ in circles:
+        _require_near(said, (east, north), origin)
+    stated = world.get("no_fly_m", [])
+    if not isinstance(stated, list):
+        raise ConfigError(f"world.no_fly_m = {stated!r:.40}: must be a list of [east, north, radius]")
+    world["no_fly_m"] = [*stated, *circles]
+
+
+def _take_people(mission: dict[str, Any], said: str, shapes: Shapes, origin: _Point) -> None:
+    if shapes.no_points or not shapes.points:
+        raise ConfigError(f"{said}: {shapes.no_points or 'it holds no points'}")
+    places = [_flat(point, origin) for point in shapes.points]
+    for place in places:
+        _require_near(said, place, origin)
+    mission["survivor_positions_m"] = [[round(part, 2) for part in place] for place in places]
+    mission.setdefault("survivors", len(shapes.points))
+
+
+def origin_of(world: dict[str, Any]) -> _Point:
+    """Latitude and longitude of `world.origin_deg`, which may have units; raises ConfigError."""
+    stated = world.get("origin_deg")
+    numbers = [_number("origin_deg", part) for part in stated] if isinstance(stated, list | tuple) else []
+    if len(numbers) != 2 or not (abs(numbers[0]) <= 90 and abs(numbers[1]) <= 180):
+        raise ConfigError(
+            f"world.origin_deg = {stated!r:.60}: must be latitude and longitude, within 90 and 180 degrees"
+        )
+    return numbers[0], numbers[1]
+
+
+def _number(key: str, stated: Any) -> float:  # noqa: ANN401  (of TOML)
+    """A number as the scenario's model reads it, in the unit of its key; nan for anything else."""
+    if isinstance(stated, bool) or not isinstance(stated, int | float | str):
+        return math.nan
+    try:
+        found = in_unit_of(key, stated) if isinstance(stated, str) else None
+        return float(stated) if found is None else found
+    except (ValueError, OverflowError):
+        return math.nan
 
 
 def _take_area(world: dict[str, Any], said: str, shapes: Shapes) -> None:
@@ -102,13 +142,22 @@ def _take_area(world: dict[str, Any], said: str, shapes: Shapes) -> None:
     lats, lons = [lat for lat, _ in points], [start + half_turn(lon - start) for _, lon in points]
     middle = (min(lats) + max(lats)) / 2, half_turn((min(lons) + max(lons)) / 2)
     world.setdefault("origin_deg", [round(part, 7) for part in middle])
-    reach_m = max(abs(part) for point in points for part in _flat(point, world["origin_deg"]))
-    if 2 * reach_m > _FARTHEST_M and "area_m" not in world:
+    origin = origin_of(world)
+    reach_m = max(abs(part) for point in points for part in _flat(point, origin))
+    if "area_m" in world:
+        half_m = _number("area_m", world["area_m"]) / 2
+        if reach_m > half_m + _ROUNDED_M:
+            raise ConfigError(
+                f"{said}: its polygons reach {reach_m:.0f} m from world.origin_deg = [{origin[0]:g}, {origin[1]:g}], "
+                f"beyond world.area_m / 2 = {half_m:g}: leave out area_m, or also the origin"
+            )
+    elif 2 * reach_m > _FARTHEST_M:
         raise ConfigError(f"{said}: the square around its polygons has {2 * reach_m:.0f} m, must be <= {_FARTHEST_M:g}")
-    world.setdefault("area_m", math.ceil(2 * reach_m))
+    else:
+        world["area_m"] = math.ceil(2 * reach_m)
 
 
-def _require_near(said: str, place: tuple[float, float], origin: Any) -> None:  # noqa: ANN401  (of TOML)
+def _require_near(said: str, place: tuple[float, float], origin: _Point) -> None:
     if math.hypot(*place) > _FARTHEST_M:
         raise ConfigError(
             f"{said}: a place is {math.hypot(*place):.0f} m from world.origin_deg = [{origin[0]:g}, {origin[1]:g}], "
@@ -116,12 +165,12 @@ def _require_near(said: str, place: tuple[float, float], origin: Any) -> None:  
         )
 
 
-def _flat(point: _Point, origin: Any) -> tuple[float, float]:  # noqa: ANN401  (of TOML)
-    at = to_enu(Geodetic(*point, 0.0), Geodetic(float(origin[0]), float(origin[1]), 0.0))
+def _flat(point: _Point, origin: _Point) -> tuple[float, float]:
+    at = to_enu(Geodetic(*point, 0.0), Geodetic(*origin, 0.0))
     return at.east, at.north
 
 
-def _around(ring: list[_Point], origin: Any) -> list[float]:  # noqa: ANN401
+def _around(ring: list[_Point], origin: _Point) -> list[float]:
     """East, north and radius of a circle around a polygon: about the middle of its extent."""
     corners = [_flat(point, origin) for point in ring]
     east = (min(e for e, _ in corners) + max(e for e, _ in corners)) / 2
@@ -130,7 +179,7 @@ def _around(ring: list[_Point], origin: Any) -> list[float]:  # noqa: ANN401
     return [round(east, 2), round(north, 2), math.ceil(100 * radius_m) / 100]
 
 
-def _circle(circle: tuple[float, float, float], origin: Any) -> list[float]:  # noqa: ANN401
+def _circle(circle: tuple[float, float, float], origin: _Point) -> list[float]:
     east, north = _flat(circle[:2], origin)
     return [round(east, 2), round(north, 2), circle[2]]
 

@@ -36,7 +36,7 @@ class Mission(Section):
     area: Annotated[str, read_with_file("mission.area")] = ""
     """A file with the area to search (.plan, .kml, .kmz, .geojson, .waypoints), read with the scenario:
     `world.origin_deg` is the middle of its polygons and `world.area_m` the least square around them, unless those keys
-    are there."""
+    are there and all polygons lie within."""
     survivors_in: Literal["area", "buildings"] = "area"
     """Where the random places are: anywhere in the open area, or inside buildings."""
     buried: Annotated[float, Field(ge=0, le=1)] = 0.0

@@ -122,6 +122,37 @@ def test_an_area_changes_neither_origin_nor_size_that_are_there(files: Path) -> 
     assert found.world.area_m == 900
 
 
+@pytest.mark.parametrize(
+    "world", ["area_m = 400", "area_m = 600\norigin_deg = [47.3, 8.51]", "area_m = 1.0e6\norigin_deg = [8.5, 47.3]"]
+)
+def test_a_square_that_leaves_some_of_the_area_unsearched_is_refused(files: Path, world: str) -> None:
+    """A search flew over a place that had been given by mistake, and nothing said that it was another one."""
+    with pytest.raises(ConfigError, match=r"area\.kml: its polygons reach \d+ m .* world\.area_m / 2 = [235]"):
+        scenario(files, f'[mission]\narea = "area.kml"\n[world]\n{world}')
+
+
+def test_an_origin_with_units_is_one_and_what_is_none_is_one_sentence(files: Path) -> None:
+    """Both were tracebacks; elsewhere in a scenario a number may be text with its unit."""
+    found = scenario(files, '[mission]\narea = "area.kml"\n[world]\norigin_deg = ["47.3 deg", "8.5"]\narea_m = "1 km"')
+    assert found.world.origin_deg == (47.3, 8.5)
+    for wrong in ('["north", 8.5]', "[147.3, 8.5]", "[47.3]", "47.3", "[true, 8.5]", "[nan, 8.5]"):
+        with pytest.raises(ConfigError, match=r"world\.origin_deg = .* must be latitude and longitude, within 90 and"):
+            scenario(files, f'[mission]\narea = "area.kml"\n[world]\norigin_deg = {wrong}')
+    with pytest.raises(ConfigError, match=r"world\.no_fly_m = 3"):
+        scenario(files, '[world]\nno_fly = "towers.kml"\nno_fly_m = 3\norigin_deg = [47, 8]')
+    with pytest.raises(ConfigError, match=r"world = 3"):
+        config.parse('world = 3\nmission.area = "area.kml"', source="s", name="s", folder=files)
+
+
+def test_no_change_of_one_run_moves_the_origin_about_which_people_are_laid(files: Path) -> None:
+    """They and the area went along with it, to a place that the file does not name."""
+    path = files / "search.toml"
+    path.write_text('[nodes]\ncount = 9\n[mission]\narea = "area.kml"\nsurvivors_at = "people.kml"')
+    with pytest.raises(ConfigError, match=r"--set changes world\.origin_deg, but .* laid about \[47\.3, 8\.5\]"):
+        config.load(path, ["world.origin_deg=[47.31, 8.5]"])
+    config.load(path, ["world.area_m=800"])
+
+
 def test_fences_to_stay_outside_are_no_fly_areas(files: Path) -> None:
     found = scenario(files, '[mission]\narea = "area.plan"\n[world]\nno_fly = "area.plan"\nno_fly_m = [[1, 2, 3]]')
     first, tower, circle = found.world.no_fly_m

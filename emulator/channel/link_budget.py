@@ -79,11 +79,13 @@ def reach_with_gain_m(radio: Radio, gain_dbi: float) -> float:
     return _distance_m(radio, budget_db + gain_dbi)
 
 
-def heard_m(radio: Radio) -> float:
-    """The greatest distance of reception without shadowing and fading; of another package's channel `range_m`."""
+def heard_m(radio: Radio, *, gain_dbi: float = 0.0) -> float:
+    """The greatest distance of reception without shadowing and fading, if one antenna has a gain; of another package's
+    channel `range_m`, which grows with the gain as in free space.
+    """
     if radio.channel == "range" or radio.channel not in CHANNELS:
-        return radio.range_m
-    return _distance_m(radio, radio.tx_power_dbm - radio.sensitivity_dbm)
+        return radio.range_m * math.pow(10.0, gain_dbi / 20)
+    return _distance_m(radio, radio.tx_power_dbm - radio.sensitivity_dbm + gain_dbi)
 
 
 def _distance_m(radio: Radio, budget_db: float) -> float:

@@ -1,4 +1,5 @@
-"""Who was within reach of whom, second by second, by the true positions in the trace and the reach of the channel.
+"""Who was within reach of whom, second by second, by the true positions in the trace and the reach of the channel,
+which is greater for an antenna with a gain.
 
     link in second k   both on the air, within reach at its beginning or at its end, and not parted by a fault then
 
@@ -7,6 +8,7 @@ Obstacles, fading, weaker links and collisions are left out: this is what distan
 exceed it, one that carries packets for a while can.
 """
 
+from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -20,7 +22,7 @@ from fanet_mw.units import S
 from sim.records.record_kinds import records_of
 from sim.results.outcome import Outcome
 from sim.results.parted_air import Extent, PartedAir, parted
-from sim.world.arrays import Flags, Rows
+from sim.world.arrays import Flags, Rows, Values
 from sim.world.environment.layout import positions
 from sim.world.mobility.guidance import Guidance
 
@@ -36,8 +38,14 @@ def parts(linked: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
 
 
 def connectivity(scenario: Scenario) -> float:
-    """The share of (source, target, second of the measured window) with a multi-hop path of `radio.range_m` links."""
-    guidance = Guidance(np.array(positions(scenario)[: scenario.nodes.count], dtype=np.float64), scenario)
+    """The share of (source, target, second of the measured window) with a multi-hop path of links of `radio.range_m`,
+    longer ones of the post on the ground by its antenna.
+    """
+    starts, on_ground = np.split(np.array(positions(scenario), dtype=np.float64), [scenario.nodes.count])
+    guidance = Guidance(starts, scenario)
+    reach_m = _of_pairs(
+        scenario, scenario.radio.range_m, {n: x * scenario.radio.range_m for n, x in scenario.reaches.items()}
+    )
     first_ns, end_ns = scenario.traffic_window_ns
     pairs = [(source, target) for source in sources_of(scenario) for target in targets_of(scenario, source)]
     if not pairs:
@@ -45,10 +53,18 @@ def connectivity(scenario: Scenario) -> float:
     sources, targets = np.array(pairs).T - 1
     shares = []
     for t_s in range(first_ns // S, max(end_ns // S, first_ns // S + 1)):
-        at = guidance.track(float(t_s)).places
-        part = parts(within(at, scenario.radio.range_m))
+        at = np.vstack([guidance.track(float(t_s)).places, on_ground])
+        part = parts(within(at, reach_m))
         shares.append(float((part[sources] == part[targets]).mean()))
     return float(np.mean(shares))
+
+
+def _of_pairs(scenario: Scenario, reach_m: float, others_m: Mapping[int, float]) -> Values:
+    """The reach between each two nodes; `others_m`: that of all links of some nodes."""
+    found = np.full((scenario.node_count, scenario.node_count), reach_m)
+    for node, other_m in others_m.items():
+        found[node - 1] = found[:, node - 1] = other_m
+    return found
 
 
 _OFF_AIR: Final = frozenset({"cut", "mute", "deaf", "stop", "crash"})
@@ -56,17 +72,20 @@ _OFF_AIR: Final = frozenset({"cut", "mute", "deaf", "stop", "crash"})
 
 
 class Absentees:
-    """The UAVs whose process has ended, and those off the air by a fault, as records tell in their order."""
+    """The nodes whose process has ended, and those off the air by a fault, after the records that were taken in."""
 
     KINDS: Final = (ProcessEnded, ProcessStarted, RadioFault)
     """The kinds of records that tell it."""
 
     def __init__(self) -> None:
         self.dead: set[int] = set()
+        """The nodes whose process has ended and was not started again."""
         self._faults: dict[str, int] = {}
+        """The node of each fault in force, by the label of the fault."""
 
     @property
     def off_air(self) -> set[int]:
+        """The nodes that neither have links nor are searching, because of a fault in force."""
         return set(self._faults.values())
 
     def take(self, record: Record) -> None:
@@ -83,7 +102,9 @@ class LinksOverTime:
     """The links of each second of a run; rows and columns are node ids less one."""
 
     def __init__(self, outcome: Outcome) -> None:
-        self._reach_m = heard_m(outcome.scenario.radio)
+        scenario = outcome.scenario
+        posts_m = heard_m(scenario.radio, gain_dbi=scenario.ground.gain_dbi)
+        self._reach_m = _of_pairs(scenario, heard_m(scenario.radio), dict.fromkeys(scenario.reaches, posts_m))
         self.seconds = max(1, -(-outcome.simulated_ns // S))
         self._instants = _instants(outcome, self.seconds + 1)
         self._near: dict[int, Flags] = {}
@@ -104,22 +125,24 @@ class LinksOverTime:
         return self._near[id(now)]
 
 
-def within(at: Rows, reach_m: float) -> Flags:
-    """Whether each pair of nodes is within reach; a node that is nowhere (NaN) is within that of itself only."""
+def within(at: Rows, reach_m: Values) -> Flags:
+    """Whether each two nodes are within reach [m, n x n]; a node that is nowhere (NaN) is in reach of itself only."""
     near: Flags = np.linalg.norm(at[:, None] - at[None], axis=2) <= reach_m
     near |= np.eye(len(at), dtype=bool)
     return near
 
 
 class _Instant(NamedTuple):
-    """The positions, NaN of nodes off the air, and what parts the air."""
+    """What decides about links at one instant."""
 
     at: Rows
+    """The positions of all nodes, NaN of nodes off the air."""
     extents: tuple[Extent, ...]
+    """The partitions and jammed areas in force."""
 
 
 def _instants(outcome: Outcome, count: int) -> list[_Instant]:
-    """The beginning of each second; the same object while nothing changes."""
+    """The swarm at the beginning of each second; the same object while nothing changes."""
     at = np.array(positions(outcome.scenario), dtype=np.float64)
     absent, air = Absentees(), PartedAir(outcome.scenario.radio)
     found: list[_Instant] = []

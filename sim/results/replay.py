@@ -57,12 +57,12 @@ class Replay:
             elif isinstance(record, FlightModeChanged | MissionModeChanged | Planned | RoleChanged):
                 self._changes[type(record), record.node].append(record)
         if not self._posed and scenario.mobility.model == "static":
-            for node, at in enumerate(positions(scenario), 1):
+            for node, at in zip(scenario.uav_ids, positions(scenario), strict=False):  # the post comes last
                 self._posed[node] = [Posed(0, node, *at)]
 
     @property
     def nodes(self) -> Sequence[NodeId]:
-        """Those whose positions are known; raises ConfigError if there are none."""
+        """The UAVs whose positions are known; raises ConfigError if there are none."""
         if not self._posed:
             raise ConfigError("the trace has no positions of UAVs (`posed`), so there is nothing to replay")
         return [NodeId(node) for node in sorted(self._posed)]

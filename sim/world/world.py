@@ -51,7 +51,9 @@ _WRECK_M: Final = 0.5
 _EMERGENCY_CHARGE: Final = 0.05
 """The share of its charge at which a flight controller lands where it is (PX4's BAT_EMERGEN_THR)."""
 _LEVEL_S: Final = 7.0
-"""The time in which the rotors' drag takes a level Iris along with the air: m / (4 lambda w)."""
+"""The time in which the drag of its rotors takes a level Iris along with the air: mass / (4 rotors x drag coefficient x
+rotor speed).
+"""
 _CONTROL_S: Final = 0.05
 """The longest step of the guidance within a tick."""
 
@@ -67,7 +69,7 @@ class Ticks:
         self.count = 0
         """The number of ticks that took place."""
         self.skipped = 0
-        """The number of ticks that were left out, because the host woke the world more than a period after them."""
+        """The number of ticks that were left out, because a later one was due when the host woke the world."""
 
     def begin(self, now_ns: int, *, period_ns: int) -> None:
         self.last_ns = now_ns
@@ -154,7 +156,8 @@ class WorldActor(Actor):
             self._find_wrecks(solids)
         self._ticks = Ticks()
         self._incidents = Incidents(scenario, starts)
-        self._moves = scenario.mobility.model != "static" or scenario.mission.survivors > 0
+        self._traces = scenario.mobility.model != "static" or scenario.mission.survivors > 0
+        """Whether positions go into the trace: not before anybody moves."""
         self._malformed = 0
 
     # --- the actor contract ---------------------------------------------------------------------------------------
@@ -328,7 +331,8 @@ class WorldActor(Actor):
             self.outbox.append((self._topics.obstruction, self._sight.obstructions(every, now_ns)))
         states = array("d", np.hstack([every, np.vstack([velocity, still])]).astype(np.float64).tobytes())
         self.outbox.append((self._topics.pose, Poses(now_ns, self._all_ids, states)))
-        if self._moves and now_ns // _TRACED_NS > before_ns // _TRACED_NS:
+        self._traces = self._traces or self._guidance.flown
+        if self._traces and now_ns // _TRACED_NS > before_ns // _TRACED_NS:
             for node, (east, north, up) in zip(self._ids, at.tolist(), strict=True):
                 if self._flies[node - 1]:
                     self.records.append(Posed(now_ns, node, round(east, 2), round(north, 2), round(up, 2)))

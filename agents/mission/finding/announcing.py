@@ -76,8 +76,10 @@ class Announcing:
             self._meets_ns = now_ns + self._node % _TURNS * _TURN_NS
 
     def repeated(self, found: Found, now_ns: int) -> None:
-        """Somebody has flooded a verdict that this UAV knows."""
-        self._flooded_ns[found.survivor] = now_ns
+        """Somebody has flooded a verdict that is not new to this UAV; an outdated one does not count."""
+        held = self._survivors.verdict(found.survivor)
+        if held is not None and held.standing is found.standing:
+            self._flooded_ns[found.survivor] = now_ns
 
     def on_post(self, now_ns: int) -> None:
         """The post on the ground is in reach, and may not know yet what was found while it was not."""

@@ -27,7 +27,7 @@ from fanet_mw.units import Enu, S
 from fanet_mw.wire.survivors import Found, is_person
 
 _SAME_SIGMAS: Final = 4.0
-"""A sighting also belongs to a person within this number of standard deviations of both, and so does a find."""
+"""A sighting, or a find, may belong to a person if both are at most this number of standard deviations apart."""
 _STEADY_M: Final = 1.5
 """The part of the error of a sighting, along each axis, that is the same for successive sightings."""
 _TOGETHER: Final = 2
@@ -37,8 +37,8 @@ In a single one the second may be a false alarm.
 _UNREPORTED_NS: Final = 4 * S
 """How long a person who is certainly there waits, near phones without an owner, before being reported without one."""
 _PLACED_NS: Final = 2 * S
-"""How long they wait where no such phone is near: the UAV sees them from another side meanwhile, which places them more
-exactly."""
+"""How long such a person waits where no such phone is near: the UAV sees the person from another side meanwhile, which
+places both more exactly."""
 _SURE_M: Final = 3.5
 """The greatest standard deviation with which a person is reported without a phone."""
 _GATE: Final = 16.0
@@ -50,7 +50,7 @@ _NEAR_M: Final = 400.0
 _BESIDE_M: Final = 150.0
 """A confirmed survivor can only have been mistaken for people within this distance."""
 _FRESH: Final = 4
-"""Among whom the owner of a phone is, is asked again after this number of further powers."""
+"""Among which people the owner of a phone is, is computed again only after this number of further powers."""
 _ELSEWHERE: Final = 0.1
 """A survivor is not said to be among people while the probability is greater that none of them carries the phone."""
 _CROWD_M: Final = 50.0
@@ -59,10 +59,10 @@ _BY_SIDE_M: Final = 15.0
 """People at no more than this distance are found together, so it makes no difference which of their phones is whose."""
 _REFUTED_COST: Final = 9.0
 """An additional cost at a place where the same survivor was confirmed by mistake, because other UAVs know better."""
-_ALONE_M: Final = 20.0
-"""Within this distance of a person seen alone nobody else was seen; errors of two UAVs' positions add up to that."""
 _DOUBTED_NS: Final = 30 * S
-"""For how long: whatever was received since then tells more than the refutation."""
+"""How long after the refutation it is added: what was received since then tells more."""
+_ALONE_M: Final = 20.0
+"""A person is alone if nobody else was seen within this distance, to which errors of two UAVs' positions add up."""
 
 
 class Sighting(NamedTuple):
@@ -71,7 +71,7 @@ class Sighting(NamedTuple):
     at: Enu
     sigma_m: float
     close: bool
-    """From so near that it certainly is a person."""
+    """True if it counts towards a confirmation: a camera's from any height, a microphone's from nearby only."""
 
 
 class Identities:
@@ -91,7 +91,7 @@ class Identities:
         """The error of the height by which the places of all people are corrected."""
         self._among: dict[int, Estimate] = {}
         self._weighed: dict[int, int] = {}
-        """The number of powers of each phone when it was last asked among whom its owner is."""
+        """The number of powers of each phone when it was last computed among whom its owner is."""
         self._now_ns = 0
 
     def on_reading(
@@ -129,8 +129,8 @@ class Identities:
         return shown
 
     def _surprise(self, person: PersonTrack, at: Enu, variance_m2: float) -> float:
-        """By how much less a sighting tells the farther from a person it is, and the less exactly both are placed: so
-        much more ground is there on which false alarms pass for the same person.
+        """By how much less a sighting proves that a person is there, the farther away it is and the less exactly both
+        are placed, because more false alarms then pass for the same person.
         """
         of_both_m2 = person.place.east_variance_m2 + variance_m2 + self._steady_m2
         wider = max(1.0, 2 * math.pi * of_both_m2 / PLACE_M2)
@@ -142,7 +142,9 @@ class Identities:
         return sighting._replace(at=at._replace(east=at.east + up_m * lean[0], north=at.north + up_m * lean[1]))
 
     def _learn_height(self, person: PersonTrack, at: Enu, variance_m2: float, lean: tuple[float, float]) -> None:
-        """Learn from a person seen again, with another lean, which error puts both sightings in one place."""
+        """Learn the error of the UAV's height from a person seen again with another lean (`_lean`): that error which
+        puts both sightings in one place.
+        """
         up_m, place = self._height_error.m, person.place
         leaned = lean[0] - person.lean[0], lean[1] - person.lean[1]
         moved_m = at.east - place.east_m - up_m * leaned[0], at.north - place.north_m - up_m * leaned[1]
@@ -153,7 +155,7 @@ class Identities:
             person.parallax = NOTHING_TOLD
 
     def _correct_places(self) -> None:
-        """Put all people where the error of the height, as it is known now, has them."""
+        """Correct the places of all people by the error of the height, as it is known now."""
         up_m = self._height_error.m - self._raised_m
         self._raised_m += up_m
         for person in self._people if up_m else ():
@@ -165,7 +167,9 @@ class Identities:
     def on_images(
         self, count: int, shows: Callable[[Enu], bool], *, evidence: float, but: Sequence[PersonTrack] = ()
     ) -> None:
-        """So many images have shown none of the people whose places were in them, except those of `but`."""
+        """So many images have shown none of the people whose places they show (`shows`), except those in `but`;
+        `evidence`: of one such image.
+        """
         for person in self._people:
             if count and person not in but and shows(person.place.at):
                 person.evidence += count * evidence
@@ -207,7 +211,9 @@ class Identities:
         return sorted(sure)
 
     def _has_news(self, survivor: int, known: KnownSurvivor) -> bool:
-        """True if it is worth while to ask again among whom a survivor is, who is not known to be anywhere."""
+        """True, once for each `_FRESH` further powers, if it is to be computed among whom a survivor without a verdict
+        is.
+        """
         powers = known.filter.included_powers
         if known.settled is not None or powers < self._weighed.get(survivor, 0) + _FRESH:
             return False
@@ -215,7 +221,9 @@ class Identities:
         return True
 
     def _note_among(self, survivor: int, whose: Carriers, people: Sequence[PersonTrack]) -> None:
-        """A survivor is among people who have all been seen well, and near each other, if nobody else is likely."""
+        """Note that a survivor is among people, if they have all been seen well, are near each other, and anybody else
+        is an unlikely owner.
+        """
         if whose.nobody <= _ELSEWHERE and all(
             is_seen_enough(person) for person, share in zip(people, whose.shares, strict=True) if share > _ELSEWHERE
         ):
@@ -266,7 +274,7 @@ class Identities:
         self._recognize_the_lonely()
 
     def _recognize_the_lonely(self) -> None:
-        """Who is seen with nobody beside is whom a find a little farther away means, where nobody is seen."""
+        """Assign each find that is left to a person a little farther away than usual who is seen alone."""
         taken = {person.find for person in self._people}
         finds = {find: place for find, place in self._survivors.person_places().items() if find not in taken}
         for person in self._people if finds else ():
@@ -276,7 +284,9 @@ class Identities:
                 person.find = None if near is None else list(finds)[near]
 
     def against(self, confirmed: Found) -> float:
-        """How much less likely a confirmed pair is than the best assignment nearby without it; <= 0 if part of it."""
+        """By how much more the best assignment of nearby phones to people costs with a confirmed pair than without; 0
+        if the best one contains it.
+        """
         at = estimate_of(confirmed).at
         named = {
             survivor: place
@@ -309,7 +319,9 @@ class Identities:
         )
 
     def _margin(self, costs: Sequence[Sequence[float]], row: int, column: int, people: Sequence[PersonTrack]) -> float:
-        """By how much more it costs at least if neither a person nor anybody found together with it has a phone."""
+        """By how much more it costs at least if neither this person nor anybody found together with it has the phone of
+        a column.
+        """
         at, others, nobody = people[row].place.at, [list(one) for one in costs], _nobody(people)
         for other, person in enumerate(people):
             if person.place.distance_m(at) <= _BY_SIDE_M:
@@ -347,7 +359,9 @@ def _lean(at: Enu, here: Enu) -> tuple[float, float]:
 def paired(
     seen: Sequence[Estimate], found: Sequence[Estimate], *, steady_m2: float, within_m: float = SAME_PLACE_M
 ) -> list[int | None]:
-    """For each of these places, which of those of finds is of the same person, if any; one find is of one person."""
+    """For each place where a person was seen, the index of the find that is of the same person, or None; each find is
+    of one person.
+    """
     costs = [
         [
             one.distance_m(other.at) ** 2
@@ -370,5 +384,5 @@ def _doubted(place: Estimate, doubt_m: float) -> Estimate:
 
 
 def _nobody(people: Sequence[PersonTrack]) -> list[float]:
-    """The cost that each of these people carries none of the phones, which is the greater for who is surely there."""
+    """The cost that each of these people carries none of the phones; greater for one who is certainly there."""
     return [_GATE + GREATEST_MARGIN * person.is_proven for person in people]

@@ -2,7 +2,7 @@
 
 A refutation takes back confirmations of the same place that are not younger than itself, in whatever order they arrive,
 and the best announced estimate unless that is younger. Of two confirmations that nothing refutes, the first to arrive
-stays. Confirmed phones calibrate the others (`calibration.py`).
+stays. The phones of confirmed survivors calibrate those of the others (`calibration.py`).
 """
 
 from dataclasses import dataclass, field
@@ -41,7 +41,7 @@ class KnownSurvivor:
     """The most exact verdict that the survivor is inside a building, or among people seen: nobody need fly there."""
     confirmed: Found | None = None
     looked_at: LookedAt = field(default_factory=LookedAt)
-    """Where cameras have looked for whomever."""
+    """Where cameras have looked, for any survivor."""
     refuted: list[Found] = field(default_factory=list)
     """The refutations of this survivor, each with the place that was confirmed by mistake, oldest first."""
     _elsewhere: tuple[tuple[Estimate, int], Estimate] | None = None
@@ -57,7 +57,7 @@ class KnownSurvivor:
         return any(_refutes(refuted, found) for refuted in self.refuted)
 
     def was_mistaken_at(self, at: Enu, *, since_ns: int) -> bool:
-        """True if the survivor was confirmed by mistake at this place, as was found out since an instant."""
+        """True if a confirmation of the survivor at this place was refuted after an instant."""
         return any(
             refuted.t_us * US >= since_ns and estimate_of(refuted).distance_m(at) <= SAME_PLACE_M
             for refuted in self.refuted
@@ -69,8 +69,8 @@ class KnownSurvivor:
         return heard is not None and heard.sigma_m <= sigma_m
 
     def place(self) -> Estimate | None:
-        """The confirmed place, otherwise the more exact of the own and the announced one, which counts for nothing once
-        cameras have looked there; None without any.
+        """The confirmed place, otherwise the more exact one of this UAV's estimate and the announced one; that one does
+        not count once cameras have looked there. None if there is none.
         """
         if self.confirmed is not None:
             return estimate_of(self.confirmed)
@@ -128,7 +128,9 @@ class KnownSurvivors:
         return known
 
     def on_found(self, found: Found, *, now_ns: int) -> bool:
-        """Take in an announcement; True if it confirms an unconfirmed survivor, or takes a confirmation back."""
+        """Take in an announcement; True for a verdict that changes something: it confirms an unconfirmed survivor,
+        takes the confirmation back, or is the first by which nobody need fly there.
+        """
         if is_person(found.survivor):
             return self._on_person(found)
         known = self.by_id.get(found.survivor)
@@ -171,7 +173,7 @@ class KnownSurvivors:
         return True
 
     def verdict(self, survivor: int) -> Found | None:
-        """The confirmation of a survivor or a person that holds, otherwise the latest refutation; None without any."""
+        """The verdict on a survivor or a person that holds (`KnownSurvivor.verdict`); None without any."""
         if is_person(survivor):
             return self.persons.get(survivor)
         known = self.by_id.get(survivor)

@@ -31,7 +31,7 @@ REFERENCE_LOSS_DB: Final = 40.05
 CELL_M: Final = 25.0
 _HALF_CELLS: Final = 18
 """The grid reaches this many cells to each side of its middle, which is at most `_OFF_CENTER_M` away from the place of
-the strongest received power: a phone is first received from up to 400 m, where shadowing is kind."""
+the strongest received power: where shadowing is weak, a phone is first received from up to 400 m."""
 _WIDTH: Final = 2 * _HALF_CELLS + 1
 _EVERY_CELL: Final = (True,) * (_WIDTH * _WIDTH)
 _NUMBERS: Final = tuple(map(float, range(_WIDTH)))
@@ -54,7 +54,7 @@ _NEVER: Final = 0.02
 _OVERLOOKED: Final = 0.03
 """The probability that cameras that have looked at a place have not seen who lies there."""
 _CONSIDERED: Final = 16.0
-"""Places less probable than the most probable one by more than this are not considered elsewhere (twice a log)."""
+"""`estimate_elsewhere` leaves out places less probable than the most probable one by more than this (twice a log)."""
 _STEP_M: Final = 5.0
 """The step of distance in the table of probabilities without reception."""
 _VAGUE_M: Final = 50.0
@@ -81,7 +81,7 @@ class Estimate(NamedTuple):
 
     @property
     def is_vague(self) -> bool:
-        """True for an estimate for which no UAV leaves its place in a team; a follower may go there."""
+        """True for an estimate too inexact to look for the survivor there: more powers have to be received first."""
         return self.sigma_m > _VAGUE_M
 
     @property
@@ -335,7 +335,9 @@ class PhoneFilter:
 
 
 def weighted(points: Sequence[tuple[float, float, float]], *, grain_m: float) -> Estimate:
-    """The mean and the covariance of points on the ground, each with its weight, east and north, in a grid."""
+    """The mean and the covariance of points on the ground, each given by weight, east and north; every point stands for
+    a square with sides of `grain_m`.
+    """
     total = math.fsum(weight for weight, _, _ in points)
     east = math.fsum(weight * e for weight, e, _ in points) / total
     north = math.fsum(weight * n for weight, _, n in points) / total
@@ -361,7 +363,9 @@ def _inside(middle: Enu, half_m: float) -> Sequence[bool]:
 
 
 def _expectation(position: Enu, beside: Sequence[Enu], shadowing_db: float) -> tuple[list[float], float]:
-    """Weights of the residuals at places `beside` in the expected one, and the deviation that is left."""
+    """The residual that is expected at a position from those at the places `beside`, as the weight of each of these,
+    and the standard deviation of the difference [dB].
+    """
     variance = max(shadowing_db, 1.0) ** 2
     own = variance + _READING_DB * _READING_DB
 
@@ -393,7 +397,7 @@ def _product(values: Iterable[float], factors: Iterable[float]) -> float:
 
 
 def _news(position: Enu, silent_at: Iterable[Enu]) -> float:
-    """The share of what silence at a place tells that earlier ones, which share its shadowing, have not told."""
+    """The weight of a place without reception: the more earlier such places share its shadowing, the less it tells."""
     return 1 / (1 + math.fsum(math.exp(-_ground_m(position, at) / _CORRELATION_M) for at in silent_at))
 
 

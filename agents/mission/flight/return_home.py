@@ -1,6 +1,6 @@
 """The return of a UAV whose battery runs low, that hears nobody any more, or whose search is over: it flies home above
 all UAVs that search, and lands, at last towards the marker of its own pad. Of UAVs whose pads are beside each other one
-lands at a time. Whoever does not know its place gives it up as well: its flight controller holds it.
+lands at a time. A UAV that does not know its position gives up the search as well, and its flight controller holds it.
 """
 
 from collections.abc import Set as AbstractSet
@@ -22,19 +22,21 @@ HOME_HIGHER_M: Final = 18.0
 LANDS_WITHIN_M: Final = 1.5
 """The UAV lands once it is within this horizontal distance of its base, and nearly stands."""
 _STANDS_M_S: Final = 0.5
+"""A UAV that is slower than this nearly stands."""
 _HOLD_M: Final = 40.0
 """The distance from its pad at which a UAV waits for its turn."""
 _OVER_M: Final = 15.0
 """A UAV this near to its pad has its turn."""
 _SUNK_M: Final = 3.0
-"""The next one comes when the one before has sunk so far; it sinks on while that one comes."""
+"""The next UAV comes when the one before has sunk this far below it, and sinks on."""
 _SINKS_M_S: Final = 0.7
-"""Who is lower and does not sink at this speed is still on its way up, or stands."""
+"""A UAV that is lower and sinks less fast than this is still on its way up, or stands."""
 _LOW_M: Final = 25.0
-"""Who is lower by this stands at home, or has nothing to do there."""
+"""A UAV that is lower by this stands at home, or does not come to land."""
 _TURN_S: Final = 14.0
 """The time between two landings beside each other."""
 _LAND_M_S: Final = 1.5
+"""The speed at which a UAV sinks to land."""
 _SEEN_NS: Final = 1_500 * MS
 """A UAV goes on towards its pad for this long after it last saw the marker."""
 _SEEN_GAIN: Final = 0.3
@@ -46,8 +48,8 @@ _OFF_M: Final = 0.4
 _LOW_OVER_PAD_M: Final = 2.0
 """Lower than this over its pad a UAV waits until it is within `_OFF_M` of it, and then sinks straight down."""
 _NO_FIX_NS: Final = 1_500 * MS
-"""A UAV does not know its place after so long without a position, or after `_NO_FIXES` intervals of positions if that
-is longer: by then its flight controller holds it, because no velocity is commanded without a position."""
+"""A UAV does not know where it is after so long without a position, or after `_NO_FIXES` intervals of positions if that
+is longer. By then its flight controller holds it, because no velocity is commanded without a position."""
 _NO_FIXES: Final = 3
 
 
@@ -94,7 +96,7 @@ class ReturnHome:
         """The instant at which another UAV was last heard; None before the first time: there is no link to lose."""
         self.reason: ReturnReason | None = None
         self._was_blind = False
-        """True once the flight controller has not known its place either: it lands, and may obey nothing further."""
+        """True once the flight controller has not known its position either: it lands, and may obey nothing further."""
         self.lands = False
         self._pad: Enu | None = None
         """The pad, in the UAV's own coordinates, by its marker; None until the camera has seen it on the way home."""
@@ -114,7 +116,9 @@ class ReturnHome:
         self._endurance.on_wind(velocity)
 
     def stands_on_pad(self) -> None:
-        """The base is where the receiver says that this UAV stands, so that errors which last are the same later."""
+        """Take the position that the receiver states now for the base, because an error that lasts is the same when the
+        UAV lands.
+        """
         here = self._own_motion.position
         self._home = self._home._replace(east=here.east, north=here.north)
 
@@ -128,7 +132,7 @@ class ReturnHome:
         self._home = self._home._replace(east=self._pad.east, north=self._pad.north)
 
     def on_heard(self, now_ns: int) -> bool:
-        """Another UAV was heard; returns True if this one therefore takes part in the mission again."""
+        """Another node was heard; returns True if this UAV therefore takes part in the mission again."""
         self._heard_ns = now_ns
         if self.reason is not ReturnReason.LOST_LINK or self.lands:
             return False
@@ -163,11 +167,14 @@ class ReturnHome:
         return True
 
     def end(self, reason: ReturnReason = ReturnReason.DONE) -> None:
-        """The search is over, or the UAV is recalled: it leaves now, for good if it only waits for its position."""
+        """The search is over, or the UAV is recalled: it leaves, unless it flies home already; one that only waits for
+        a position flies home once it has one.
+        """
         if self.reason in (None, ReturnReason.LOST_POSITION):
             self.reason = reason
 
     def release(self) -> bool:
+        """The recall is taken back; returns True if this UAV therefore takes part in the mission again."""
         if self.reason is not ReturnReason.RECALLED or self.lands:
             return False
         self.reason = None

@@ -46,7 +46,7 @@ _ONCE_NS: Final = 3 * S
 _AGAIN_NS: Final = 15 * S
 """How long an echo counts as solid. A first echo may be noise; a second one beside it hardly is."""
 _MOVER_NS: Final = seconds_to_ns(1.2)
-"""How long a flying body that the radar has shown is avoided."""
+"""How long a flying body that the radar has shown is avoided; half as long once there is a further scan."""
 
 _Circle = tuple[float, float, float]
 """East, north and radius."""
@@ -61,6 +61,8 @@ class Mover(NamedTuple):
 
 
 class _Echoed(NamedTuple):
+    """An obstacle in a cell, as echoes show it."""
+
     top_m: float
     until_ns: int
 
@@ -152,11 +154,11 @@ class KnownObstacles:
         return self._map.ground_m(place.east, place.north) if self._map.heights_m else 0.0
 
     def roof_m(self, place: Enu) -> float | None:
-        """The height of the roof below a place, by the map; None if there is none."""
+        """The height of the highest roof below a place, or within `_MARGIN_M` of it; None if there is none."""
         return self._index.roofs_m.get(cell_of(place.east, place.north))
 
     def least_up_m(self, at: Enu, velocity: Enu) -> float:
-        """The least height on this course: above the roofs that are flown over, with some clearance."""
+        """The least height on this course: `OVER_M` above the roofs that the UAV is high enough to fly over."""
         if not self._index.roofs_m:
             return -math.inf
         ahead = [
@@ -177,7 +179,7 @@ class KnownObstacles:
         return [mover for mover in self._movers if now_ns - mover.at_ns <= _MOVER_NS]
 
     def planes(self, at: Enu, now_ns: int) -> list[HalfPlane]:
-        """The constraints on the velocity, one for each of the nearest obstacles, the nearest first."""
+        """The limits of the velocity, one for each of the nearest obstacles, the nearest first."""
         found = [
             building.outside(at.east, at.north)
             for building in self._index.near.get(cell_of(at.east, at.north, TILE_M), ())
@@ -199,7 +201,9 @@ class KnownObstacles:
         return [HalfPlane(east, north, (_CLEAR_M - distance) / _APPROACH_S) for distance, east, north in near]
 
     def way_to(self, at: Enu, goal: Enu, moves: Enu, *, now_ns: int) -> Enu | None:
-        """The place to fly to on the way to a moving goal; None if the straight way is clear, or none was found."""
+        """The place to fly to on the way to a moving goal; None to fly straight to it, because that way is clear, or no
+        other was found.
+        """
         if not self._any and not self._taken and not self.hovering:
             return None
 
@@ -250,7 +254,7 @@ class KnownObstacles:
 
 
 def _put(cells: dict[Cell, _Echoed], cell: Cell, fresh: _Echoed, now_ns: int) -> None:
-    """Note an echo in a cell, unless the cell has one that is higher or lasts longer."""
+    """Note an echo in a cell; of it and one that still counts there the greater height and the later end hold."""
     before = cells.get(cell)
     if before is not None and before.until_ns > now_ns:
         fresh = _Echoed(max(before.top_m, fresh.top_m), max(before.until_ns, fresh.until_ns))

@@ -22,20 +22,28 @@ from fanet_mw.scenario.named_files import content
 from sim.world.arrays import Rows
 
 LEVEL_M: Final = 3.0
+"""The height of one level of a building."""
 _FOOT_M: Final = 0.3048
 _INCH_M: Final = 0.0254
 _INCHES_A_FOOT: Final = 12
 _LONGEST_TAG: Final = 60
+"""A note quotes at most so many characters of a tag."""
 _LEAST_SIDE_M: Final = 0.1
+"""An outline whose rectangle has a shorter side encloses nothing; no box has one."""
 _HIGHEST_M: Final = 2000.0
+"""A greater height in a tag is passed over."""
 _LEAST_FILLED: Final = 0.85
+"""An outline that fills so much of its rectangle is not cut."""
 _LEAST_CONVEX: Final = 0.95
+"""An outline that fills so much of its convex hull is not cut, because no cut makes its boxes smaller."""
 _LEAST_PART_M2: Final = 0.01
+"""What a cut leaves that is smaller is passed over."""
 _MOST_PARTS: Final = 16
+"""The greatest number of boxes of one building."""
 _MOST_CUTS: Final = 24
 """The number of cuts that are tried on a part, along each axis."""
 _MOST_ANGLES: Final = 400
-"""Of a round outline of thousands of corners not each side is tried."""
+"""The number of sides along which a rectangle around an outline is tried."""
 _KEYS: Final = (
     ("height", 1.0), ("building:height", 1.0), ("est_height", 1.0), ("building:levels", LEVEL_M),
     ("building_levels", LEVEL_M), ("levels", LEVEL_M), ("num_floors", LEVEL_M),
@@ -68,23 +76,28 @@ class Footprint(NamedTuple):
 
 
 class Town(NamedTuple):
-    """The buildings within the area, and how many of the file were guessed or passed over."""
+    """The buildings within the area, and what was guessed or passed over."""
 
     boxes: tuple[Footprint, ...]
     buildings: int
+    """The number of buildings in the file."""
     guessed: tuple[str, ...]
     """The buildings within the area of which a tag could not be read as it is written."""
     untold: int
     """The number of buildings within the area of which no tag states a height."""
     broken: tuple[str, ...]
-    """The outlines of the file that enclose nothing, as far as they lie within the area."""
+    """The outlines that are no building: those of the file that cannot be one, and those within the area whose corners
+    lie on a line.
+    """
     middle_deg: tuple[float, float]
     """Latitude and longitude of the middle of the file."""
 
 
 @lru_cache(maxsize=8)
 def read(path: Path, *, origin_deg: tuple[float, float], height_m: float, area_m: float, digest: str = "") -> Town:
-    """The buildings whose middle lies in the area; raises ConfigError. `digest`: that of a changed file is another."""
+    """The buildings of a file whose middle lies in the area; raises ConfigError. `digest`: of the file, so that it is
+    read again once it has changed.
+    """
     data = content(path, key="world.buildings_geojson", digest=digest)
     try:
         found = outlines.parse(data)
@@ -168,7 +181,7 @@ def _turn(yaw: float) -> Rows:
 
 
 def _rectangle(ring: Rows, height: float) -> Footprint:
-    """The smallest rectangle around a ring has a side along one of its hull (Freeman and Shapira, 1975)."""
+    """The smallest rectangle around a ring, which has a side along one of its hull (Freeman and Shapira, 1975)."""
     hull = _hull(ring)
     edges = np.diff(hull, axis=0)
     angles = np.unique(np.round(np.arctan2(edges[:, 1], edges[:, 0]) % (math.pi / 2), 9))
@@ -237,7 +250,9 @@ def _covered(ring: Rows) -> float:
 
 
 def _halves(ring: Rows) -> list[Rows]:
-    """Both sides of the best cut: the smallest rectangles, or else one that needs no further cut."""
+    """Both sides of the best cut: that which leaves the smallest rectangles, and of equal ones the largest part that
+    needs no further cut.
+    """
     best: tuple[float, float] | None = None
     halves: list[Rows] = []
     for axis in (0, 1):

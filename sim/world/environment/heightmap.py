@@ -26,12 +26,14 @@ from fanet_mw.units import Enu
 from sim.world.arrays import Flags, Rows, Values
 
 _MOST_CELLS: Final = 64_000_000
+_ROUNDED: Final = 1e-9
+"""The share of a length that may be lost by rounding."""
 _LOWEST_M: Final = -500.0
 _HIGHEST_M: Final = 9000.0
 """Land lies between the shore of the Dead Sea, -430 m, and Mount Everest, 8849 m."""
 _ODD_M: Final = 50.0
 _ODD_SHARE: Final = 0.1
-"""Cells that are so much lower than all others, and no greater share of them, are told."""
+"""The lowest cells are told if they are this much lower than all others, and no greater share of the area."""
 _THOUSANDS_M: Final = re.compile(r"[1-9],\d{3}")
 """A height with a comma that may be one of thousands; no land is higher."""
 _MOST_PRJ_BYTES: Final = 1 << 16
@@ -91,7 +93,7 @@ class Heightmap(NamedTuple):
 
 @lru_cache(maxsize=4)
 def read(path: Path, *, origin_deg: tuple[float, float], area_m: float, digest: str = "") -> Heightmap:
-    """Heights of the area, and a cell beyond it; raises ConfigError with the file's name."""
+    """Heights of the area, and of a cell beyond it where the file has one; raises ConfigError with the file's name."""
     data = content(path, key="world.heightmap", digest=digest)
     try:
         found = _read(path, data, _lattice(origin_deg, area_m))
@@ -211,10 +213,10 @@ def _require_area(found: Heightmap, path: Path, origin_deg: tuple[float, float],
     if found.middle_deg is None:
         for axis, side, count in ((0, "east", columns), (1, "north", rows)):
             cell_m = 1 / float(found.per_m[axis, axis])
-            if (count - 1) * cell_m < area_m - cell_m:
+            if count * cell_m < area_m * (1 - _ROUNDED):
                 degrees = "; if its cells are degrees: gdalwarp -t_srs EPSG:... -tr 30 30" if cell_m < 1 else ""
                 raise ConfigError(
-                    f"world.heightmap: {path} covers {(count - 1) * cell_m:g} m to the {side}, "
+                    f"world.heightmap: {path} covers {count * cell_m:g} m to the {side}, "
                     f"which must be >= world.area_m = {area_m:g}{degrees}"
                 )
         return

@@ -2,7 +2,7 @@
 
 Only pairs within the radio's reach are examined, and only if one end is below the highest obstacle. With
 `radio.obstruction_loss_db = "knife_edge"` pairs count whose straight line passes near an edge, too.
-Not modeled: waves through walls. Survivors' phones are not examined, because they can be received through walls.
+Survivors' phones are not examined, because they can be received through walls.
 
 What an edge costs: the loss of a radio link over or around the main edge between its ends, a single knife edge (ITU-R
 P.526-15, 4.1).
@@ -35,7 +35,9 @@ _NEAR_M: Final = 1.0
 _RISE_M: Final = 0.1
 """Ground that rises less above the straight line between the ground at both ends is no edge."""
 FRESNEL_M: Final = 6.0
-"""Obstacles farther from the straight line than this cost nothing: at 2.4 GHz, nu = -0.78 in the middle of 4 km."""
+"""Obstacles farther from the straight line than this are taken to cost nothing, as at 2.4 GHz on links of up to 4 km,
+in whose middle nu is -0.78 there.
+"""
 
 
 def knife_edge_db(nu: Values) -> Values:

@@ -22,17 +22,22 @@ from sim.world.arrays import Rows, Values
 from sim.world.environment import footprints, heightmap
 
 _NEAR_DEG: Final = 1.0
+"""Buildings this near to the exchanged origin are told to have longitude and latitude exchanged."""
 _CLEAR_M: Final = 5.0
 """The least distance between a random building and a UAV at its start."""
 _TRIES: Final = 200
+"""The number of random places that are tried for a building."""
 _CELLS: Final = 96
 """The greatest number of grid cells of the hills per side."""
 _FILE_CELLS: Final = 255
 """The same for hills from a file; pybullet accepts no more."""
 _WAVES: Final = 8
 _EXACT_M: Final = 1e-3
+"""The ground may be this much lower than the file."""
 _ROUNDS: Final = 12
-"""The number of times that a grid is raised before it takes the highest point around each of its own."""
+"""The number of times that a grid is raised; one that is still too low takes at each of its points the highest of the
+file around it.
+"""
 _BEYOND_M: Final = 1000.0
 """The mesh of the ground extends this far beyond the area."""
 Indices = npt.NDArray[np.int64]
@@ -72,7 +77,7 @@ class Hills(NamedTuple):
     cell_m: float
 
     def at(self, places: Rows) -> Values:
-        """Height of the ground at each place [n, 2 or 3]."""
+        """The height of the ground at each place [n, 2 or 3]."""
         last = self.heights.shape[0] - 1
         column = np.clip(places[:, 0] / self.cell_m + last / 2, 0, last)
         row = np.clip(places[:, 1] / self.cell_m + last / 2, 0, last)
@@ -217,7 +222,9 @@ def _hills_of_file(scenario: Scenario) -> Hills:
 
 
 def _not_below(heights: Rows, cell_m: float, east: Values, north: Values, least: Values) -> Rows:
-    """A grid raised where it would be lower than `least`, but nowhere above the highest place beside one."""
+    """A grid of heights, raised so that it is nowhere lower than the heights `least` at places of the file, but at no
+    point above the highest of the places in the cells around it.
+    """
     side = len(heights)
     x, y = (np.clip(part / cell_m + (side - 1) / 2, 0, side - 1 - 1e-9) for part in (east, north))
     i, j = y.astype(np.int64), x.astype(np.int64)

@@ -26,6 +26,25 @@ def test_who_never_says_where_it_is_stays_where_it_was_put(make_scenario: MakeSc
     assert links.at(0) is links.at(0)
 
 
+def test_the_post_on_the_ground_is_as_far_in_reach_as_its_antenna_makes_it(make_scenario: MakeScenario) -> None:
+    """A gain of 20 dBi makes a reach of 250 m ten times as long."""
+    keys = {"nodes.count": 2, "nodes.spacing_m": 900, "nodes.layout": "line", "radio.range_m": 250}
+    for gain_dbi, reached in ((0, [False, False]), (20, [True, True])):
+        scenario = make_scenario(**keys, **{"ground.at_m": [0, 2400], "ground.gain_dbi": gain_dbi})
+        linked = LinksOverTime(Outcome(scenario, "virtual", 1.0, [], {})).at(0)
+        assert linked[2, :2].tolist() == linked[:2, 2].tolist() == reached
+        assert not linked[0, 1], "UAVs have no antenna of that kind"
+
+
+@pytest.mark.parametrize(("gain_dbi", "share"), [(0, 0.0), (20, 1.0)])
+def test_the_post_on_the_ground_is_a_target_and_passes_on(
+    make_scenario: MakeScenario, gain_dbi: float, share: float
+) -> None:
+    keys = {"nodes.count": 2, "nodes.spacing_m": 900, "nodes.layout": "line", "radio.range_m": 250}
+    ground = {"ground.at_m": [0, 2400], "ground.gain_dbi": gain_dbi}
+    assert connectivity(make_scenario(**keys, **ground, **{"traffic.sources": [1]})) == share
+
+
 def test_who_was_started_again_has_links_again(make_scenario: MakeScenario) -> None:
     keys = {"nodes.count": 2, "nodes.spacing_m": 240, "nodes.layout": "line", "radio.range_m": 250}
     records = [ProcessEnded(2 * S, 2, "agent-2", -9), ProcessStarted(5 * S, 2, "agent-2")]

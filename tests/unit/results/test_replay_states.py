@@ -161,3 +161,8 @@ def test_a_swarm_that_stands_has_no_positions_in_its_trace_and_is_replayed_where
     content = replay_page.content(Replay(scenario, RECORDS[-3:]))
     assert content["end_s"] == 30
     assert content["at"][0] == content["at"][-1] == [round(value) for at in positions(scenario) for value in at]
+
+
+def test_the_post_on_the_ground_is_no_uav_of_a_swarm_that_stands(make_scenario: Callable[..., Scenario]) -> None:
+    scenario = make_scenario(**KEYS | {"mobility.model": "static", "ground.at_m": [0, -90]})
+    assert Replay(scenario, RECORDS[-3:]).nodes == [*scenario.uav_ids]

@@ -17,7 +17,7 @@ from sim.world.environment import obstacles
 
 IMPOSSIBLE = [
     ('world.heightmap="nope.asc"', r"world.heightmap: .*nope.asc: cannot be read"),
-    ('world.heightmap="small.asc"', r"covers 1 m to the east, which must be >= world.area_m = 800"),
+    ('world.heightmap="small.asc"', r"covers 2 m to the east, which must be >= world.area_m = 800"),
     ('world.buildings_geojson="none.json"', r"none.json is no GeoJSON of buildings: it holds no Polygon"),
     ("world.no_fly_m=[[0,0,50]]", r"world.no_fly_m.0: node 1 starts within it"),
     ("world.buildings=[[0,0,300,300,200]]", r"a node starts within the building at \[0, 0\]"),

@@ -11,7 +11,7 @@ from fanet_mw.bus.messages import Gps, Poses, Setpoint, WifiScan
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import Collided
+from fanet_mw.trace import Collided, Posed
 from fanet_mw.units import MS, Enu, S
 from sim.world.world import WorldActor
 
@@ -89,6 +89,20 @@ def test_who_flies_into_the_ground_collides_once_and_it_is_counted(make_scenario
     advance(made, 30 * S)
     assert [(r.node, r.other) for r in made.records if isinstance(r, Collided)] == [(2, 1)]
     assert made.report()["collisions"] == 1
+
+
+def test_a_swarm_that_stands_has_positions_in_the_trace_from_when_one_of_it_is_sent_away(
+    make_scenario: MakeScenario,
+) -> None:
+    made = world(make_scenario)
+    advance(made, 3 * S)
+    assert not any(isinstance(record, Posed) for record in made.records), "all are where they were put"
+    steer(made, 2, Enu(0.0, 0.0, 50.0), now_ns=3 * S)
+    advance(made, 60 * S)
+    last = [record for record in made.records if isinstance(record, Posed)][-4:]
+    assert [record.node for record in last] == [1, 2, 3, 4]
+    assert last[1].t_ns == 60 * S
+    assert (last[1].east_m, last[1].north_m) == pytest.approx((0, 0), abs=10), "as far as its receiver tells"
 
 
 def test_scans_of_the_uavs_are_spread_over_the_interval(make_scenario: MakeScenario) -> None:

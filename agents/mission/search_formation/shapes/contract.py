@@ -22,14 +22,14 @@ FOLLOWER_HIGHER_M: Final = 12.0
 FOLLOW_M: Final = 110.0
 """The distance of a follower behind its team, in lines and sectors."""
 _SQUARE_EDGE_M: Final = 60.0
-"""Rings and fans turn no farther from the edge of the area than this."""
+"""Rings, fans, and lines of few UAVs turn no farther from the edge of the area than this."""
 _WIDE: Final = 0.9
 """Two places that must be within reach of each other are at most this share of the radio's reach apart."""
 _LANES: Final = 1.35
 """The distance of two lanes is at most this multiple of the distance to the side at which a phone is received."""
 EDGE_M: Final = 25.0
-"""Lines, teams of sectors, and rings with enough UAVs turn at this distance from the edge, because cameras see the edge
-from there. In a small area it is less."""
+"""Lines and rings with enough UAVs, and teams of sectors, turn at this distance from the edge, because cameras see the
+edge from there. In a small area it is less."""
 FIRST_M: Final = 16.0
 """The distance of each line from the middle, or of a sector's team from the side where its sweep begins, at the
 beginning: far enough for two teams not to be in each other's way, and near enough to receive what lies behind them."""
@@ -132,7 +132,7 @@ class Demands(NamedTuple):
 
     @property
     def edge_m(self) -> float:
-        """The distance from the edge of the area at which rings and fans turn."""
+        """The distance from the edge of the area at which rings, fans, and lines of few UAVs turn."""
         return min(_SQUARE_EDGE_M, self.area_m / 8, self.seen_m / 2)
 
 

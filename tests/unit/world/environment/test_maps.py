@@ -229,8 +229,17 @@ def test_an_ascii_grid_in_degrees_lies_where_it_belongs(tmp_path: Path) -> None:
 def test_a_grid_that_may_be_in_degrees_or_not_is_refused_with_the_way_to_make_it_clear(tmp_path: Path) -> None:
     path = tmp_path / "world.asc"
     path.write_text(grid("xllcorner 2\nyllcorner 48\ncellsize 0.25", hill()))
-    with pytest.raises(ConfigError, match=r"covers 2\.5 m to the east, .*; if its cells are degrees: gdalwarp"):
+    with pytest.raises(ConfigError, match=r"covers 2\.75 m to the east, .*; if its cells are degrees: gdalwarp"):
         ground(path, (0, 0))
+
+
+@pytest.mark.parametrize(("cells", "covers"), [(26, "780"), (27, "")])
+def test_the_cells_of_a_grid_in_metres_must_cover_the_area(tmp_path: Path, cells: int, covers: str) -> None:
+    path = tmp_path / "world.asc"
+    path.write_text(f"ncols {cells}\nnrows {cells}\ncellsize 30\n" + ("7 " * cells + "\n") * cells)
+    refused = pytest.raises(ConfigError, match=rf"covers {covers} m to the east, which must be >= world.area_m = 800")
+    with refused if covers else contextlib.nullcontext():
+        heightmap.read(path, origin_deg=(0.0, 0.0), area_m=800.0)
 
 
 def test_a_tile_of_srtm_lies_where_its_name_says_and_its_voids_are_refused(tmp_path: Path) -> None:

@@ -175,7 +175,7 @@ def test_a_path_is_taken_from_the_scenario_files_folder(tmp_path: Path) -> None:
         ("ncols 2\nnrows 2\ncellsize 790\n1 2\n3 *\n", r"1 cell within .* no data.* \(line 5, column 2\)"),
         ("ncols 2\nnrows 2\ncellsize 790\nNODATA_value null\nnull 2\n3 4\n", r"1 cell .* \(line 5, column 1\)"),
         ("north: 5\nsouth: 1\n", "line 1: 'north: 5' is no line of the header .*gdal_translate -of AAIGrid"),
-        ("ncols 2\nnrows 2\ncellsize 10\n1 2 3 4\n", r"covers 10 m to the east, which must be >= world.area_m = 800"),
+        ("ncols 2\nnrows 2\ncellsize 10\n1 2 3 4\n", r"covers 20 m to the east, which must be >= world.area_m = 800"),
     ],
 )
 def test_a_heightmap_that_is_none_is_refused_by_name(

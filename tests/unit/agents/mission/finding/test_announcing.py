@@ -91,6 +91,21 @@ def test_who_hears_a_lost_one_again_floods_all_verdicts_once_but_those_that_were
     assert sorted(found.survivor for found in confirmed(board)) == [1, 2]
 
 
+@pytest.mark.parametrize("other", [Standing.INSIDE, Standing.AMONG, Standing.REFUTED])
+def test_who_hears_a_lost_one_again_floods_a_verdict_of_which_somebody_floods_another_one(other: Standing) -> None:
+    board = seen()
+    board.announcing.confirm(1, 10 * S)
+    for second in range(10, 40):
+        board.announcing.tell(None, second * S)
+    board.out.packets.clear()
+    held = board.survivors.verdict(1)
+    assert held is not None
+    board.announcing.on_returned(40 * S)
+    board.announcing.repeated(held._replace(t_us=5, standing=other), 40 * S)
+    board.announcing.tell(None, 42 * S)
+    assert [found.survivor for found in confirmed(board)] == [1], "the other part does not know the confirmation"
+
+
 def test_those_who_hear_it_take_turns() -> None:
     began = set()
     for node in range(1, 7):

@@ -159,6 +159,11 @@ def _impossible_traffic(scenario: Scenario, traffic: Traffic) -> Iterator[str]:
         yield f"traffic.destination = {traffic.destination} must be <= {scenario.last_id}"
     if isinstance(traffic.sources, int) and traffic.sources > count:
         yield f"traffic.sources = {traffic.sources} must be <= nodes.count = {count}"
+    elif traffic.sources == count and traffic.destination in scenario.uav_ids:
+        yield (
+            f"traffic.sources = {count} must be <= {count - 1}, the nodes that are not traffic.destination = "
+            f"{traffic.destination}"
+        )
     for key, ids in (("sources", traffic.sources), ("targets", traffic.targets)):
         if isinstance(ids, tuple) and any(i > scenario.node_count for i in ids):
             yield f"traffic.{key} = {list(ids)} must be node ids <= {scenario.last_id}"

@@ -42,7 +42,7 @@ class Traffic(Section):
     """Priority of the packets, which decides which packets go first, and after which time they expire (`routing`)."""
     sources: Literal["all"] | Annotated[int, Field(ge=0, le=MAX_NODES)] | tuple[Id, ...] = "all"
     """The nodes that send: a number of them (drawn by the seed among the nodes that are neither leader nor
-    destination), a list of ids, or all except the destination."""
+    destination; if these are too few, the leader is one), a list of ids, or all except the destination."""
     destination: Literal["all"] | Id = "all"
     """The id of one node, or `all`: packets are flooded."""
     deadline_s: SomeTime | None = None

@@ -65,6 +65,7 @@ def test_overrides_name_a_class_by_its_number_and_a_resolved_scenario_is_the_sam
         (TWO.replace("destination = 4", "destination = 9"), "traffic.destination = 9"),
         (TWO.replace("sources = [2]", "sources = [12]"), r"traffic.sources = \[12\]"),
         (TWO + "[radio]\nmax_frame_bytes = 600\n", "traffic.payload_bytes = 1024"),
+        (TWO.replace("sources = [2]", "sources = 5"), "traffic.sources = 5 must be <= 4, the nodes that are not traf"),
         (TWO + 'arrivals = "trace"\n', "traffic.packets: 0"),
     ],
 )

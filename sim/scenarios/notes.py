@@ -10,6 +10,7 @@ from typing import Final, get_args
 from fanet_mw.errors import ConfigError
 from fanet_mw.graph.topology import within_range
 from fanet_mw.scenario import Scenario
+from fanet_mw.scenario.tables.faults import AnyFault, BatteryFault, CrashFault, RestoreFault, StopFault
 from fanet_mw.scenario.tables.routing import PROTOCOLS
 from fanet_mw.scenario.tables.sections import Section, meanings
 from fanet_mw.scenario.tables.world import FASTEST_AIR_M_S
@@ -38,8 +39,9 @@ _SIGMAS: Final = 2.0
 def notes(scenario: Scenario) -> list[str]:
     """All notes on a scenario, one sentence each; empty if there are none."""
     kinds = (
-        _after_the_end, _without_effect, _without_place, _still_waves, _beyond_the_vehicle, _close_pads, _low_ceiling,
-        _high_roofs, _empty_batteries, _out_of_reach, _odd_band, _wide_formation, _keeping_clear_of_nobody, _guessed,
+        _after_the_end, _crossed_faults, _without_effect, _without_place, _still_waves, _beyond_the_vehicle,
+        _close_pads, _low_ceiling, _high_roofs, _empty_batteries, _out_of_reach, _odd_band, _wide_formation,
+        _keeping_clear_of_nobody, _guessed,
     )  # fmt: skip
     return [note for kind in kinds for note in kind(scenario)]
 
@@ -62,6 +64,40 @@ def _after_the_end(scenario: Scenario) -> Iterator[str]:
                 f"{name}: {len(late)} of {len(traffic.packets)} packets come too late to be sent, from "
                 f"{start_s + min(late):g} s on; duration_s - drain_s = {ends_s:g}"
             )
+
+
+def _crossed_faults(scenario: Scenario) -> Iterator[str]:
+    """Faults that end another one because neither was given a label, ends of faults that are none, and lasting ones."""
+    standing: dict[str, tuple[int, AnyFault, float]] = {}
+    for index, fault in sorted(enumerate(scenario.faults), key=lambda entry: entry[1].at_s):
+        label = fault.control().label
+        if isinstance(fault, RestoreFault):
+            if label and label not in standing:
+                known = sorted({each.control().label for each in scenario.faults if each.kind != "restore"})
+                yield f"faults.{index}.label = {label!r}: ends no fault, whose labels are {', '.join(known) or 'none'}"
+            standing = {each: kept for each, kept in standing.items() if label and each != label}
+            continue
+        if isinstance(fault, CrashFault | BatteryFault) and fault.for_s:
+            yield f"faults.{index}.for_s = {fault.for_s:g}: no effect; a {fault.kind} is for good"
+        ends_s = fault.at_s + fault.for_s if fault.for_s else math.inf
+        earlier, other, until_s = standing.get(label, (index, fault, 0.0))
+        if (
+            until_s > fault.at_s
+            and not (other.label and fault.label)
+            and (until_s > ends_s or not _alike(other, fault))
+        ):
+            yield (
+                f"faults.{index} ends faults.{earlier} at {fault.at_s:g} s: both have the label {label}; "
+                "give one of them a label of its own"
+            )
+        standing.pop(label, None)
+        if not isinstance(fault, CrashFault | BatteryFault | StopFault):  # these end by no other
+            standing[label] = index, fault, ends_s
+
+
+def _alike(one: AnyFault, other: AnyFault) -> bool:
+    """True for two faults of one kind of which the later may be meant to take the place of the earlier."""
+    return one.kind == other.kind and (one.kind not in ("jam", "partition") or one.at_s != other.at_s)
 
 
 def _without_effect(scenario: Scenario) -> Iterator[str]:

@@ -34,10 +34,10 @@ class FaultSection(Section):
     at_s: Duration
     """The swarm time at which it begins."""
     for_s: Annotated[float, Field(ge=0, le=1e6)] = 0.0
-    """How long it lasts; 0: until it is restored."""
+    """How long it lasts; 0: until it is restored. A crash, and what a battery has lost, are for good."""
     label: Annotated[str, Field(max_length=MAX_LABEL, pattern=r"^[ -~]*$")] = ""
-    """The name by which `restore` ends it; by default made from its kind and nodes. A new fault ends an old one with
-    the same label."""
+    """The name by which `restore` ends it; by default `node-N` whatever befalls node N, `link-SRC-DST`, `links`, `jam`
+    or `partition`. A new fault ends an old one with the same label."""
 
     @property
     def for_ns(self) -> int:
@@ -209,7 +209,7 @@ class RestoreFault(Section):
     at_s: Duration
     """The swarm time at which the fault ends."""
     label: str = ""
-    """Label of that fault; by default all faults end."""
+    """Label of that fault, given or by default; without a label all faults end."""
 
     def control(self) -> Control:
         return Restore(self.label)

@@ -59,6 +59,46 @@ def test_what_comes_after_the_end_is_noted(changes: dict[str, object], said: lis
     assert [text.partition(": after the end")[0] for text in found] == said
 
 
+CUT, GPS = 'kind="cut",node=2,at_s=1', 'kind="gps",node=2,at_s=2,for_s=1'
+JAMS = 'kind="jam",radius_m=9,at_s=1,center_m=[0,0]', 'kind="jam",radius_m=9,at_s=1,center_m=[50,0]'
+DEGRADES = 'kind="degrade",src=1,dst=2,at_s=1,loss_db=3', 'kind="degrade",src=1,dst=2,at_s=2,loss_db=9'
+
+
+@pytest.mark.parametrize(
+    ("faults", "said"),
+    [
+        ((CUT, GPS), "faults.1 ends faults.0 at 2 s: both have the label node-2; give one of them a label of its own"),
+        ((GPS, CUT), "faults.0 ends faults.1 at 2 s: both have the label node-2; give one of them a label of its own"),
+        ((f"{CUT.replace('cut', 'stop')},for_s=5", GPS), None),
+        ((f"{CUT},for_s=1", GPS), None),
+        ((CUT, f'{GPS},label="receiver"'), None),
+        ((f'{CUT},label="x"', f'{GPS},label="x"'), None),
+        (JAMS, "faults.1 ends faults.0 at 1 s: both have the label jam; give one of them a label of its own"),
+        (DEGRADES, None),
+        (
+            (DEGRADES[0], f"{DEGRADES[1]},for_s=1"),
+            "faults.1 ends faults.0 at 2 s: both have the label link-1-2; give one of them a label of its own",
+        ),
+        ((f"{CUT},for_s=3", f"{CUT},for_s=1"), "faults.1 ends faults.0 at 1 s: both have the label node-2; give one o"),
+        ((CUT, 'kind="restore",at_s=2'), None),
+        ((CUT, 'kind="restore",at_s=2,label="node-2"', GPS), None),
+        ((CUT, 'kind="restore",at_s=2', GPS), None),
+        (
+            (CUT, 'kind="restore",at_s=2,label="cut 2"'),
+            "faults.1.label = 'cut 2': ends no fault, whose labels are node-2",
+        ),
+        (('kind="restore",at_s=2,label="jam"', JAMS[0].replace("at_s=1", "at_s=3")), "faults.0.label = 'jam': ends no"),
+        (('kind="crash",node=2,at_s=1,for_s=2',), "faults.0.for_s = 2: no effect; a crash is for good"),
+        (('kind="crash",node=2,at_s=1', CUT), None),
+    ],
+)
+def test_faults_that_end_others_unasked_or_end_none_are_noted(faults: tuple[str, ...], said: str | None) -> None:
+    """The second of two jammers ended the first, and a receiver that failed switched a radio on again."""
+    every = ",".join(f"{{{fault}}}" for fault in faults)
+    found = notes(catalog.find("quick", [f"faults=[{every}]"]))
+    assert [note[: len(said or "")] for note in found] == ([said] if said else [])
+
+
 def test_uavs_for_whom_the_plan_has_no_place_are_noted() -> None:
     few = ["world.area_m=1000", "nodes.spacing_m=50"]
     assert notes(catalog.find("rescue", [*few, "nodes.count=79"])) == []

@@ -20,22 +20,28 @@ from sim.records.record_kinds import Column
 from sim.results.packets import AppPackets
 
 UNNOTICED_NS: Final = 4 * S
-"""So long after a fault has begun bounds may count on what is gone."""
+"""For so long after a fault has begun a bound may count on a link or node that is gone."""
 _OF_PLACES: Final = ("partition", "jam")
 """Faults that UAVs fly into as long as they last."""
 
 Span = tuple[int, int]
+"""The first and the last instant of a time."""
 
 
 class _Held(NamedTuple):
-    """The bounds of one application's packets, compared with its deliveries; `late` and the rest count copies."""
+    """The bounds of one application's packets, compared with its deliveries."""
 
     app: AppPackets
     stated_ns: list[int]
+    """The bounds that were stated."""
     delays_ns: Column
+    """The delays of all deliveries for which a bound was stated."""
     late: int
+    """How many of these exceed the bound."""
     never: int
+    """How many more deliveries had not come when the bound was over."""
     overtaken: int
+    """How many of all these a fault excuses."""
 
 
 def against_bounds(
@@ -53,12 +59,12 @@ def against_bounds(
 
 
 def broken(bound: Mapping[str, Any]) -> int:
-    """How many bounds of a table `bound` did not hold, those aside that a fault overtook."""
+    """How many times a bound of a table `bound` did not hold without a fault that excuses it."""
     return int(bound.get("violations", 0)) - int(bound.get("overtaken", 0))
 
 
 def _surprises(faults: Sequence[RadioFault], ended_ns: int) -> list[Span]:
-    """When each fault is one that not everybody knows of."""
+    """For each fault the time in which not every node need know of it."""
     spans = []
     for number, fault in enumerate(faults):
         if fault.active:
@@ -110,8 +116,8 @@ def _held(app: AppPackets, surprises: Sequence[Span], ended_ns: int) -> _Held:
     overtaken = np.zeros(len(app.sent), dtype=np.bool_)
     for since_ns, until_ns in surprises:
         overtaken |= (born_ns <= until_ns) & (over_ns >= since_ns)
-    broken = (late + missing)[overtaken].sum()
-    return _Held(app, bounds_ns[bounds_ns >= 0].tolist(), delays_ns, int(late.sum()), int(missing.sum()), int(broken))
+    excused = (late + missing)[overtaken].sum()
+    return _Held(app, bounds_ns[bounds_ns >= 0].tolist(), delays_ns, int(late.sum()), int(missing.sum()), int(excused))
 
 
 def _summed_up(many: Collection[_Held]) -> dict[str, Any]:

@@ -1,7 +1,8 @@
 """The packets that applications sent, and their deliveries at the nodes for which they were meant.
 
 Only the first delivery at each target counts; a second one is `repeated`: the node's process was restarted. A packet is
-`unknown` if no node sent it at the instant that its header states: it is forged, or its origin's record is lost.
+`unknown` if no node sent one of its number, or with exact clocks none at the instant that its header states: it is
+forged, or its origin's record is lost.
 """
 
 from collections.abc import Mapping
@@ -66,7 +67,9 @@ class AppPackets:
         self.wanted = 0
         """The sum over all packets of the number of nodes for which the packet was meant."""
         self.deliveries = _NONE
+        """The first delivery of each packet at each node for which it was meant."""
         self.repeated = 0
+        """Further deliveries there."""
         self.unknown = 0
         """Deliveries of unknown packets, whatever they claimed; counted for the first application only."""
 

@@ -267,8 +267,8 @@ class WorldActor(Actor):
         """The velocities that flight controllers ask for, as they really are."""
         estimate, guidance = self._estimate, self._guidance
         if estimate is None or not guidance.flown:
-            return guidance.wanted(t_s, at, self._engine.velocities())
-        wish = guidance.wanted(t_s, at, self._engine.velocities(), estimate.off_m)
+            return guidance.wanted(t_s, at)
+        wish = guidance.wanted(t_s, at, estimate.off_m)
         flown = ~guidance.grounded(at) & guidance.commanded(len(at))
         wish = wish - estimate.off_m_s * flown[:, None]
         if self._adrift.any():

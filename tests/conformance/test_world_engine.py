@@ -137,7 +137,7 @@ def test_ten_uavs_sent_to_one_point_settle_around_it_and_never_touch(engine: Eng
     for node in range(1, 11):
         guidance.steer(node, Enu(0, 0, 50), speed_m_s=10)
     for step in range(300):  # 15 s; the flight takes 6 s
-        engine.advance(0.05, guidance.wanted(step * 0.05, engine.positions(), engine.velocities()))
+        engine.advance(0.05, guidance.wanted(step * 0.05, engine.positions()))
         assert engine.contacts() == []
     assert np.linalg.norm(engine.positions() - [0, 0, 50], axis=1).max() < 40
 

@@ -124,7 +124,7 @@ def flown_down(scenario: Scenario, engine: Engine, starts: Rows, solids: Solids)
         guidance.land_at_once(node)
     for step in range(240):
         engine.stand(guidance.grounded(engine.positions()))
-        engine.advance(0.05, guidance.wanted(step * 0.05, engine.positions(), engine.velocities()))
+        engine.advance(0.05, guidance.wanted(step * 0.05, engine.positions()))
     found = guidance.grounded(engine.positions())
     high = engine.positions()[:, 2] - solids.surface_m(engine.positions())
     assert (high > -0.01).all()

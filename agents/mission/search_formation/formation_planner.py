@@ -1,8 +1,9 @@
 """Plans the search: one node decides which UAV takes which place of the formation, and floods the plan.
 
-The planner is the lowest id that was received recently, of each part of a swarm that has come apart. Lost UAVs keep
-their places: the others close ranks by themselves (`roll_call.py`). Who flies home is replaced at once, and once the
-others cannot span the area, they get a plan of their own (docs/explanation/search.md, Who decides what).
+The planner is the node with the lowest id that was received recently; each part of a swarm that has come apart has its
+own. Lost UAVs keep their places: the others close ranks by themselves (`roll_call.py`). A UAV that flies home is
+replaced at once; once those that stay cannot span the area any more, they get a plan for another formation
+(docs/explanation/search.md, Who decides what).
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -19,7 +20,9 @@ from fanet_mw.wire.search_plan import Search, SearchStatus
 STATUS_S: Final = 12.0
 """The interval at which a UAV sends its status."""
 _LOST_NS: Final = 70 * S
-"""A UAV from which nothing was received for this time has no right to its place any more."""
+"""A UAV from which nothing was received for this time does not plan any more, and if it is lost has no right to its
+place.
+"""
 _SETTLED_NS: Final = 10 * S
 """How long a plan is followed, at least, before it is mended."""
 _PATIENCE_NS: Final = 14 * S
@@ -29,7 +32,7 @@ NOTICE_NS: Final = 7 * S
 NOTICE_IN_ROUNDS_NS: Final = 3 * S
 """The same where floods go in rounds, and reach all within about a second."""
 _REMINDS_NS: Final = 1 * S
-"""A plan is flooded again so long before it begins, for those whom the first flood did not reach."""
+"""A plan is flooded again so long before it begins, for UAVs that the first flood did not reach."""
 _REPEAT_NS: Final = 6 * S
 """The interval at which a new plan is flooded again."""
 _REPEATS: Final = 3
@@ -39,18 +42,21 @@ _BEHIND_NS: Final = 15 * S
 _ASKS_NS: Final = 60 * S
 """How long a node without a plan waits to be told that of the others before it makes one that replaces theirs."""
 _BUSY_M2: Final = 500.0**2
-"""By how much longer a way, squared, a UAV may have that becomes a follower because it is out for a survivor."""
+"""The cost of a place other than a follower's for a UAV that is out for a survivor, beside the square of its way."""
 _AMONG_M_S: Final = 3.7
-"""Before a formation begins around the swarm, it stays until each could fly at this speed as far as neighbors are
-apart: who is among them is found meanwhile, and passed by nobody for long after."""
+"""A formation that begins around the swarm does so no sooner than a UAV could fly at this speed as far as neighbors are
+apart: survivors among the UAVs are found meanwhile, because nobody passes there for long after."""
 _LEAVE_NS: Final = 6 * S
-"""Once a UAV has left, those who leave with it have said so within this time: all do at the end of a search."""
+"""When this time has passed since a UAV left, all that leave together, as at the end of a search, have said so."""
 _REVISION_BITS: Final = 16
 
 
 class _HeardUav(NamedTuple):
+    """What a node knows of another UAV, or of itself, for a plan."""
+
     position: Enu
     heard_ns: int
+    """The instant at which the node was there, and said so."""
     revision: int
     """The plan that the node follows, by its latest status; 0 if it has none."""
     leaves: bool
@@ -79,7 +85,7 @@ class FormationPlanner:
     ) -> None:
         """`of_few`: the formation for so many UAVs when others have flown home; None: the search is over.
         `notice_ns`: from the first flood of a plan to its beginning; `take_off_ns`: the time of a take-off, before
-        which no first plan begins; `turns_ns`: how much longer it takes those who take turns.
+        which no first plan begins; `turns_ns`: how much longer the take-off of these UAVs takes if they take turns.
         """
         self._node = node
         self._roll_call = roll_call
@@ -89,14 +95,21 @@ class FormationPlanner:
         self._deploy_speed = deploy_speed_m_s
         self._random = random
         self._members: dict[int, _HeardUav] = {}
+        """All UAVs that were received, and this one, by id."""
         self._left_ns: dict[int, int] = {}
+        """The instant at which each UAV that flies home was first known to do so."""
         self._began_ns: int | None = None
+        """The instant of the first review."""
         self.plan: Search | None = None
+        """The plan in force; None before the first."""
         self.to_tell: list[Search] = []
         """The plans to be flooded, until the caller takes them."""
         self._told_ns: int | None = None
+        """The instant at which this node flooded a plan last."""
         self._tellings_left = 0
+        """The number of times that it still floods its own plan."""
         self._followed: Search | None = None
+        """The plan at the last review."""
         self._followed_ns = 0
         """The instant of the first review with this plan."""
 
@@ -156,7 +169,7 @@ class FormationPlanner:
         return False
 
     def _leads(self, now_ns: int) -> bool:
-        """True for the planner: of those who stay and know the plan, none with a lower id was received recently."""
+        """True for the planner: no node with a lower id was received recently that stays and knows the plan."""
         me = self._members.get(self._node)
         return not (me is not None and me.leaves) and all(
             node >= self._node
@@ -169,7 +182,9 @@ class FormationPlanner:
         )
 
     def _may_plan(self, waited_ns: int) -> bool:
-        """True if all is known that can be for a first plan; after a restart a status must tell of others' plans."""
+        """True if a first plan may be made: all UAVs are known, or were waited for long enough. While others follow a
+        plan, as after a restart of this node, it is waited for.
+        """
         members = self._members.values()
         if waited_ns < _ASKS_NS and any(member.revision for member in members):
             return False
@@ -242,7 +257,9 @@ class FormationPlanner:
     def _shared_out(
         self, pattern: Pattern, nodes: Sequence[int], starts: Sequence[Enu]
     ) -> tuple[Pattern, Sequence[int]]:
-        """The largest formation around the swarm that it reaches in one piece, else the smallest, and all places."""
+        """The largest formation around the swarm whose places the UAVs reach without coming apart, else the smallest;
+        and the place of each UAV.
+        """
         if len(nodes) == 1:
             return pattern, [(nodes[0] - 1) % pattern.places]
         absent, followers = self.absent, pattern.followers
@@ -259,7 +276,9 @@ class FormationPlanner:
         return begun, chosen
 
     def _mended(self, plan: Search, now_ns: int) -> Search | None:
-        """The plan without those who fly home, with followers in their places, and new UAVs; None if unchanged."""
+        """The plan without the UAVs that fly home, with followers in their places, and with UAVs that have come; None
+        if nothing has changed.
+        """
         pattern = pattern_of(plan, reach_m=0.0)
         gone = self.leavers
         holders = [0 if node in gone else node for node in plan.nodes]
@@ -276,7 +295,9 @@ class FormationPlanner:
         return plan._replace(revision=_next(plan.revision), planner=self._node, nodes=tuple(holders))
 
     def _for_those_who_stay(self, pattern: Pattern, holders: list[int], now_ns: int) -> Search | None:
-        """The plan of another formation once too many have flown home to span this one and nobody else is about to."""
+        """The plan of another formation for the UAVs that stay, once too many have flown home to span this one, and no
+        further one has left just now; None if that is not so.
+        """
         gone = self.leavers
         if not gone or now_ns - max(self._left_ns[node] for node in gone) < _LEAVE_NS:
             return None
@@ -342,7 +363,7 @@ def pattern_of(plan: Search, *, reach_m: float) -> Pattern:
 
 
 def _fill(holders: list[int], pattern: Pattern) -> None:
-    """The nearest follower takes each vacant place of a team or relay; a UAV that is alone keeps its place."""
+    """Give each vacant place of a team or relay to the nearest follower; a UAV that is alone keeps its place."""
     if sum(holder != 0 for holder in holders) <= 1:
         return
     for place in range(pattern.dimensions.fixed):

@@ -32,7 +32,7 @@ _STEP_S: Final = 0.05
 
 
 _HOP: Final = 0.91
-"""Neighbors in a row that has closed ranks are at most this share of the radio's reach apart: with .93 a chain at its
+"""Neighbors in a row that has closed ranks are at most this share of the radio's reach apart: with 0.93 a chain at its
 longest came apart for seconds, because its relays follow each other."""
 _LEAVES: Final = 0.93
 """Every second UAV of a row may leave while those beside it are at most this share of the reach apart."""
@@ -42,26 +42,28 @@ class Pattern:
     """A formation, and the position of each of its places over time."""
 
     def __init__(self, dimensions: Dimensions, *, reach_m: float, vacant: frozenset[int] = frozenset()) -> None:
-        """`vacant`: the places of lost UAVs: the others of a row close ranks, within the `reach_m` of their radios."""
+        """`vacant`: the places without a UAV, over which the others of their rows close ranks. `reach_m`: of radios."""
         self.dimensions = dimensions
         self.vacant = vacant
         whole = self._whole = _SHAPES[dimensions.shape](dimensions)
         self.reach_m, self._hop_m = reach_m, _HOP * reach_m
         self._rows = whole.rows()
         self._flown = {place: at for row in self._rows for place, at in row.shared(vacant).items()}
-        """Where on its row each UAV flies whose row has closed ranks."""
+        """Where on its row each UAV flies whose row has closed ranks, by its place (`RowOfPlaces.shared`)."""
         self.shape: Shape = whole.drawn_in(vacant, self._hop_m) if vacant else whole
         self._begins: dict[int, Enu] = {}
-        """Where the sweep begins for those places that were asked for: until then they are asked for all the time."""
+        """Where the sweep begins for those places that were asked for; until it begins that is asked all the time."""
         self._ties: dict[int, list[int]] = {}
-        """The places to which those places are tied that were asked for."""
+        """What `_tied_to` has returned for each place."""
 
     def closed(self, vacant: frozenset[int]) -> "Pattern":
         """The same formation without the UAVs of these places."""
         return Pattern(self.dimensions, reach_m=self.reach_m, vacant=vacant)
 
     def begun_around(self, positions: Sequence[Enu]) -> "list[Pattern]":
-        """The formation begun where a swarm stands that is spread about the middle; the largest first, at least one."""
+        """The formation as it may begin around a swarm that stands spread about the middle, the largest first; as it is
+        if it does not begin so.
+        """
         begun = self._whole.begun_around(swarm_at(positions, reach_m=self.reach_m))
         return [Pattern(dimensions, reach_m=self.reach_m) for dimensions in begun] or [self]
 
@@ -114,7 +116,9 @@ class Pattern:
         return any(others.intersection(row.places) and beside.intersection(row.places) for row in self._rows)
 
     def gap_beside(self, place: int, lost: frozenset[int]) -> tuple[int, bool]:
-        """How many are lost in the gap in its row nearest to a place, and whether at higher places; 0 without one."""
+        """How many UAVs are lost in the gap nearest to a place in its row, 0 without one; and True if that gap is at
+        higher places.
+        """
         row = self._row(place)
         gap = min((other for other in lost if row and other in row.places), key=lambda o: abs(o - place), default=None)
         if gap is None:
@@ -129,7 +133,9 @@ class Pattern:
         return levels({place: self._whole.tethers(place) for place in range(self.places)}, *gap)
 
     def _tied_to(self, place: int) -> list[int]:
-        """The places to which a place is tied, vacant ones, too; where rows meet, whoever flies nearest to there."""
+        """The places to which a place is tied, vacant ones, too. Where another row ends at a place of its row, the UAV
+        that flies nearest to that place is tied to it.
+        """
         whole = self._whole
         row = self._row(place)
         if row is None or not self.vacant:
@@ -149,7 +155,9 @@ class Pattern:
         return place if row is None else row.nearest(place, self.vacant)[0]
 
     def tethers(self, place: int, swept_s: float) -> tuple[int, ...]:
-        """Places that must stay in reach of this one, past those vacant or that may be left; none for a follower."""
+        """The places that must stay in reach of this one; instead of one that is vacant or may be left, those beyond.
+        None for a follower.
+        """
         found: set[int] = set()
         passed, waiting = {place}, [place]
         while waiting:
@@ -174,7 +182,7 @@ class Pattern:
         return self.shape.may_leave(at, swept_s, reach_m=_LEAVES * self.reach_m, left=left)
 
     def velocity(self, place: int, swept_s: float) -> Enu:
-        """The velocity of a place, without shifts to other lanes: meanwhile all wait, and who is behind stays there."""
+        """The velocity of a place, without its shifts between lanes, during which all wait at the edge of the area."""
         if swept_s < 0:
             return STILL
         early = max(0.0, swept_s - _STEP_S)
@@ -197,7 +205,9 @@ def fastest(count: int, demands: Demands) -> Pattern | None:
 
 
 def of_few(count: int, demands: Demands, *, connected: bool = True) -> Pattern:
-    """The fastest formation of so many, in one piece if it has to be `connected`: lines, one abreast, or a spiral."""
+    """The fastest formation of so many UAVs: lines, one line abreast, or a spiral; if it need not be `connected` also a
+    circuit, in which nobody keeps in reach of others.
+    """
     count = min(count, MOST_PLACES)
     found = [lines.fitted(count, demands), sectors.fitted(count, 1, demands), spiral.fitted(count, demands)]
     found += [] if connected else [circuit.fitted(count, demands)]

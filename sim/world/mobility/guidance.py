@@ -279,7 +279,7 @@ class Guidance:
         """Where the mobility model wants all UAVs to be; setpoints do not count here."""
         return self._model.track(t_s) if self._model else Track(self._starts, np.zeros_like(self._starts))
 
-    def wanted(self, t_s: float, true: Rows, velocity: Rows, off: Rows | None = None) -> Rows:
+    def wanted(self, t_s: float, true: Rows, off: Rows | None = None) -> Rows:
         """The velocity that each UAV should fly now [m/s]. `off`: by how much flight controllers mistake their places
         [n, 3]; the track of a mobility model is where UAVs really fly, whatever they believe.
         """

@@ -22,9 +22,9 @@ def guidance(make_scenario: MakeScenario, model: str, **keys: object) -> Guidanc
 def flown_to(found: Guidance, place: Enu) -> np.ndarray:
     """Where a UAV that follows a setpoint ends up."""
     found.steer(2, place, speed_m_s=20)
-    at, velocity = STARTS.copy(), np.zeros_like(STARTS)
+    at = STARTS.copy()
     for step in range(4000):
-        wanted = found.wanted(0.05 * step, at, velocity)
+        wanted = found.wanted(0.05 * step, at)
         at = at + 0.05 * wanted
     return at[1]
 
@@ -91,6 +91,6 @@ def test_who_crosses_goes_to_the_opposite_point_and_back(make_scenario: MakeScen
 def test_two_that_are_near_are_pushed_apart(make_scenario: MakeScenario) -> None:
     found = guidance(make_scenario, "static", **{"mobility.see_m": 50})
     at = np.array([[0.0, 0, 50], [2, 0, 50], [0, 100, 50]])
-    wanted = found.wanted(0.0, at, np.zeros_like(at))
-    toward_home = found.wanted(0.0, np.array([[0.0, 0, 50], [2, 500, 50], [0, 100, 50]]), np.zeros_like(at))
+    wanted = found.wanted(0.0, at)
+    toward_home = found.wanted(0.0, np.array([[0.0, 0, 50], [2, 500, 50], [0, 100, 50]]))
     assert wanted[0, 0] < toward_home[0, 0] - 1, "pushed back by the one at 2 m"

@@ -80,7 +80,7 @@ class PlannedSearch(Application):
         limits: SearchLimits | None = None,
         radio: HeardByRadio | None = None,
     ) -> None:
-        """`limits`: what an operator may change. `radio`: what the node knows of others beside their messages."""
+        """`limits`: what an operator may change. `radio`: what the search asks its node about links."""
         self._outbox = Outbox()
         self._searcher = Searcher(
             scenario, node, position=position, outbox=self._outbox, onboard_map=onboard_map,

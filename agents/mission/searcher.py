@@ -414,6 +414,7 @@ class Searcher:
                 self._return_home.end(ReturnReason.DONE if ends else ReturnReason.RECALLED)
                 self._leave(now_ns)
             case OrderKind.STAY | OrderKind.SEARCH:
+                self._return_home.release()  # it overrules a recall
                 self._leave(now_ns)
             case OrderKind.RELEASE:
                 if self._return_home.release() or not self._return_home.leaves:

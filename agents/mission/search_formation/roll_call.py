@@ -1,8 +1,9 @@
 """Which UAVs of the plan are lost, by what this UAV hears and what its neighbors say in their hellos.
 
-A UAV in reach is lost once nobody is known to have heard it for some time, at once if it falls or its radio is silent
-for unusually long; one that may be out of reach only after much longer, because news take a second a hop. Whoever finds
-by its own receiver that a UAV is lost, or back, floods its roll soon (docs/explanation/search.md, Whoever is lost).
+A UAV in reach is lost once nobody is known to have heard it for some time, and at once if it falls or its radio is
+silent for unusually long. One that may be out of reach is lost only after much longer, because news take a second per
+hop. A UAV that finds by its own receiver that another one is lost, or back, floods its roll soon
+(docs/explanation/search.md, Whoever is lost).
 """
 
 from collections.abc import Collection
@@ -21,13 +22,15 @@ _NEIGHBOR_NS: Final = 15 * S
 _AWAY_NS: Final = 40 * S
 """A UAV that was not a neighbor is lost after this time; news from the far end of a swarm are fresher."""
 _MUTE_NS: Final = 5 * S
-"""So long a UAV must hear that it is lost until it takes its own radio for mute; wrong news is taken back by its next
-hello.
+"""A UAV that hears for so long that it is lost takes its own radio for mute: wrong news would be taken back after its
+next hello.
 """
 MUTE_LEVELS: Final = 7
-"""Places that are closer than this in the plan have different levels; more levels would be too high to hear others."""
+"""The number of heights at which mute UAVs fly. Places whose numbers differ by less have different ones; UAVs on more
+levels would fly too high to hear the others.
+"""
 _AHEAD: Final = 2
-"""An instant this many units ahead of the own clock is not believed."""
+"""A roll is not believed if it states an instant that is so many times `ROLL_NS` ahead of the own clock."""
 
 
 class RollCall:
@@ -37,13 +40,17 @@ class RollCall:
         self._node, self._silent = node, silent
         self._silent_ns = max(_SILENT_NS, neighbor_lifetime_ns(hello_interval_s))
         self._heard: dict[int, int] = {}
+        """When each UAV was heard last, by this one or another, in units of `ROLL_NS`."""
         self._neighbor_ns: dict[int, int] = {}
+        """The instant at which this UAV itself has heard each other one last."""
         self.lost: dict[int, int] = {}
         """The UAVs that are lost, each with the instant at which this UAV has learned it."""
         self._falls = False
+        """Whether this UAV falls."""
         self._called_lost_ns: int | None = None
         """The instant since which every roll that names this UAV has called it lost; None: the last one has not."""
         self._mute_level = 0
+        """The level at which this UAV flies if it is mute, from 1 on."""
         self.parted: Collection[int] = ()
         """The UAVs to which no way leads any more, by the radio: they are lost, or in another part of the swarm."""
         self.has_news = False
@@ -56,7 +63,7 @@ class RollCall:
         self._take(node, now_ns // ROLL_NS, lost=falls, now_ns=now_ns)
 
     def on_roll(self, roll: Roll, plan: Search | None, *, flooded: bool = False, now_ns: int) -> None:
-        """Another UAV told, its neighbors or all (`flooded`), who was heard when."""
+        """Another UAV told its neighbors, or all UAVs (`flooded`), who was heard when."""
         if plan is None or (roll.planner, roll.revision) != (plan.planner, plan.revision):
             return
         if roll.at > now_ns // ROLL_NS + _AHEAD:
@@ -78,8 +85,9 @@ class RollCall:
             self._called_lost_ns, self._mute_level = now_ns, 1 + place % MUTE_LEVELS
 
     def mute_level(self, now_ns: int) -> int:
-        """0 while others hear this UAV, otherwise a level from 1 on by its place: mute UAVs do not know of each other,
-        and those that would close the same gap have places near each other.
+        """The level from 1 on at which this UAV flies because it is mute; 0 while others hear it. Levels go by places,
+        because mute UAVs do not know of each other, and those that would close the same gap have places near each
+        other.
         """
         called_ns = self._called_lost_ns
         return 0 if called_ns is None or now_ns - called_ns < _MUTE_NS else self._mute_level
@@ -94,7 +102,9 @@ class RollCall:
             self.lost.setdefault(node, now_ns)
 
     def review(self, plan: Search, *, since_ns: int, falls: bool = False, now_ns: int) -> None:
-        """Find who is lost, several times a second, of those due to be heard after `since_ns`. `falls`: this UAV."""
+        """Find who is lost; called several times a second. `since_ns`: from when on others should have been heard;
+        `falls`: whether this UAV does.
+        """
         self.parted = () if self._silent is None else self._silent.parted(self.lost, now_ns=now_ns)
         self.has_news |= falls and not self._falls
         self._falls = falls

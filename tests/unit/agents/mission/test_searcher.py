@@ -212,6 +212,20 @@ def test_who_is_recalled_while_it_does_not_know_its_place_comes_home_once_it_doe
     assert (flight.modes[-1], flight.charges[-1]) == ("recall", 0)
 
 
+@pytest.mark.parametrize("kind", [OrderKind.STAY, OrderKind.SEARCH])
+def test_who_was_recalled_and_is_then_sent_to_a_place_flies_there(
+    make_scenario: Callable[..., Scenario], kind: OrderKind
+) -> None:
+    flight = Flight(make_scenario, post_m=(0.0, -100.0))
+    flight.fly(40)
+    for serial, order in enumerate((Order(OrderKind.RECALL, 7), Order(kind, 7, 0.0, 300.0, 50.0)), start=1):
+        flight.searcher.on_message(ToldOrder(flight.now_ns // US, 21, serial, order), now_ns=flight.now_ns)
+        flight.fly(5)
+    assert (flight.modes[-1], flight.charges[-1]) == ("errand", 0), "the newest order holds"
+    flight.fly(60)
+    assert flight.at.horizontal_to(Enu(0.0, 300.0, 0.0)) < 90
+
+
 def test_who_flies_home_already_flies_on_once_it_knows_its_place_again(make_scenario: Callable[..., Scenario]) -> None:
     flight = Flight(make_scenario)
     flight.fly(40)

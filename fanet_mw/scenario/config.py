@@ -5,6 +5,7 @@ traffic.1.interval_s=2    a key of an entry of an array of tables, by the number
 radio.lead_ms=60ms        a value with a unit, which its key converts (`quantities.py`)
 """
 
+import contextlib
 import re
 import tomllib
 import unicodedata
@@ -116,7 +117,15 @@ def _plain(key: str, value: object, problems: list[str], path: str) -> object:
     except ValueError as error:
         problems.append(f"{path} = {value!r}: {error}")
         return value
-    return value if number is None else number
+    return _number(value) if number is None else number
+
+
+def _number(text: str) -> object:
+    """The number that a text is, so that defaults follow from it as from a number; else the text."""
+    for kind in (int, float):
+        with contextlib.suppress(ValueError):
+            return kind(text)
+    return text
 
 
 def apply_override(tree: dict[str, Any], override: str) -> None:

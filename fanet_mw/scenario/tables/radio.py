@@ -226,7 +226,9 @@ def _add_levels(keys: dict[str, Any], rate_mbps: float) -> None:
     """Fill in the defaults of sensitivity, carrier sense, energy and preamble detection."""
     figure_db, model = keys.get("noise_figure_db", 7.0), keys.get("ofdm_errors", "nist")
     access = "ns3" if keys.get("channel", "range") == "range" else keys.get("access")
-    if rate_mbps not in RATES_MBPS["g"] or not isinstance(figure_db, int | float) or model not in LEAST_SNR_DB:
+    if not (rate_mbps in RATES_MBPS["g"] and isinstance(figure_db, int | float) and isinstance(model, str)):
+        return
+    if model not in LEAST_SNR_DB:
         return
     header_mbps = 6.0 if is_ofdm(rate_mbps) else 1.0
     weakest_dbm = _sensitivity_dbm(rate_mbps, figure_db, model, access)

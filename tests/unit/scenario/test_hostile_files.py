@@ -35,6 +35,7 @@ HOSTILE = {
     "a pipe as a file": '[traffic]\npackets_csv = "pipe"',
     "a pipe as a map": '[world]\nheightmap = "pipe"',
     "a pipe as buildings": '[world]\nbuildings_geojson = "pipe"',
+    "a list in place of a word": "[radio]\nofdm_errors = []",
     "NUL in the path of a map": '[world]\nheightmap = "a\\u0000b"',
 }
 

@@ -22,6 +22,22 @@ def test_an_exponent_is_no_unit() -> None:
 
 
 @pytest.mark.parametrize(
+    ("radio", "follows"),
+    [
+        ("frequency_mhz = {}5180{}", "reference_loss_db"),
+        ("rate_mbps = {}2{}", "ack_rate_mbps"),
+        ('standard = "g"\nnoise_figure_db = {}9{}', "energy_detection_dbm"),
+    ],
+)
+def test_a_number_as_text_has_the_defaults_that_follow_from_a_number(radio: str, follows: str) -> None:
+    """They were those of the default: 40.05 dB at 1 m for 5180 MHz."""
+    head = '[radio]\nchannel = "log_distance"\n'
+    plain, text = (scenario(text=head + radio.format(mark, mark)).radio for mark in ("", '"'))
+    assert getattr(plain, follows) != getattr(scenario(text=head).radio, follows)
+    assert text == plain
+
+
+@pytest.mark.parametrize(
     ("key", "text", "value"),
     [
         ("duration_s", "2 min", 120.0),

@@ -121,6 +121,14 @@ def test_confirmations_of_nobody_are_none_and_their_refutations_reopen_nothing()
     )  # fmt: skip
 
 
+def test_a_person_without_a_phone_who_is_given_up_reopens_nothing() -> None:
+    confirmations = Confirmations(TRUTH)
+    person = person_id(1, 7)
+    for record in (Confirmed(S, 1, person, 100.0, 60.0), Refuted(2 * S, 1, person, 100.0, 60.0)):
+        confirmations.add(record)
+    assert (confirmations.persons(), confirmations.reopened) == (({}, 0), 0)
+
+
 def test_a_refutation_takes_back_what_was_confirmed_within_12_m() -> None:
     for away_m, right in ((12.0, 0), (12.1, 1)):
         found = measured([confirmed(S, 2), Refuted(2 * S, 2, 2, -100.0, -20.0 + away_m)])

@@ -234,6 +234,23 @@ def test_before_the_sweep_who_comes_second_for_somebody_does_not_hold_back_who_i
     assert flies_m_s() > 8
 
 
+def test_before_the_sweep_who_is_first_at_somebody_gives_way_to_nobody() -> None:
+    node, beside, now_ns = NodeId(34), NodeId(35), 30 * S
+    board = Board(node, Enu(0, 0, UP_M))
+    for survivor in (1, 2):
+        board.hear(survivor, Enu(600 * survivor - 900, 0, 0), range(35, 38), now_ns=now_ns)
+    board.neighbors.on_hello(beside, Motion(Enu(215, 0, UP_M), STILL, now_ns))
+    tied = ConnectivityMaintenance(
+        board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M, speed_m_s=10.0
+    )
+    board.tasks.survivor = 1
+    board.tasks._auction.bid(1, eta_s=9.0, now_ns=now_ns)
+    board.tasks.merge([Bid(1, 36, 50, serial=1), Bid(2, beside, 50, serial=1)], now_ns=now_ns)
+    assert nearest((-9.0, 0.0), tied.planes(now_ns), limit=10, hard=0)[0] > 8, "another one is there sooner"
+    board.tasks.merge([Bid(1, 36, WITHDRAWN, serial=2)], now_ns=now_ns)
+    assert nearest((-9.0, 0.0), tied.planes(now_ns), limit=10, hard=0)[0] < 0
+
+
 def test_who_closes_ranks_over_a_lost_uav_may_use_up_a_little_more_of_its_reach_in_half_of_the_time() -> None:
     now_ns = TAKEN_UP_NS + 20 * S
     board = Board(LINE, lane_of(LINE, now_ns))
@@ -347,7 +364,7 @@ def test_who_does_not_come_to_meet_this_uav_over_a_gap_is_lost_as_well() -> None
         if since_s == 10:
             there = board.own_motion.position.minus(Enu(-0.9 * REACH_M, 0, 0))
             board.neighbors.on_hello(LINE + 2, Motion(there, Enu(0, 7.5, 0), now_ns))
-    assert missed[:5] == [None] * 5
+    assert missed[:8] == [None] * 8, "it has noticed the loss after 2 s, and flies at 8.6 m/s"
     assert missed[8:11] == [LINE + 2] * 3
     assert missed[11] is None, "it was only late"
 

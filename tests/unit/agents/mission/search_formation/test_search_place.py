@@ -27,6 +27,25 @@ def test_a_place_is_taken_up_on_a_straight_way_that_begins_and_ends_with_the_pla
     assert (board.place.is_taken_up(TAKEN_UP_NS - 1), board.place.is_taken_up(TAKEN_UP_NS)) == (False, True)
 
 
+def test_nobody_hurries_over_a_lost_uav_that_had_left_its_place() -> None:
+    now_ns = TAKEN_UP_NS + 60 * S
+    for away, closes in (((), True), ((LINE + 1,), False)):
+        board = Board(LINE, lane_of(LINE, now_ns))
+        board.place.close_ranks({LINE + 1}, now_ns, away=away)
+        assert (board.place.closing_s(now_ns) is not None) is closes
+        assert board.place.pattern is not None
+        assert board.place.pattern.vacant == {LINE}, "others fly on without it in any case"
+
+
+@pytest.mark.parametrize(("since_s", "leads"), [(0, True), (40, True), (40.1, False)])
+def test_for_40_s_after_a_loss_whoever_is_nearer_to_another_part_leads(since_s: float, leads: bool) -> None:
+    now_ns = TAKEN_UP_NS + 60 * S
+    board = Board(LINE, lane_of(LINE, now_ns))
+    board.place.close_ranks({LINE + 2}, now_ns, parted=range(LINE + 3, FOLLOWER + 1))
+    assert board.place.leads_to_gap(LINE + 1, now_ns + round(since_s * S)) is leads
+    assert not board.place.leads_to_gap(LINE - 1, now_ns)
+
+
 def test_who_gets_a_place_in_another_formation_flies_there_from_where_it_is() -> None:
     here = Enu(300, -900, UP_M)
     board, now_ns = Board(LINE, here), TAKEN_UP_NS + 90 * S

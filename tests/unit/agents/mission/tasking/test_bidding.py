@@ -105,6 +105,8 @@ def test_who_sought_a_vague_place_in_vain_bids_again_at_once_when_the_phone_is_p
     board.hear(1, survivor, range(1, 2), now_ns=S)
     board.tasks.bid(S)
     board.tasks.choose(S)
+    board.tasks.choose(50 * S)
+    assert board.tasks.survivor == 1, "it goes round for 30 s, until powers tell the place"
     board.tasks.choose(57 * S)
     assert board.tasks.survivor is None, "it was held back, and has taken its bid back"
     if is_placed:

@@ -11,6 +11,7 @@ from fanet_mw.errors import ConfigError
 from fanet_mw.graph.topology import within_range
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.tables.faults import AnyFault, BatteryFault, CrashFault, RestoreFault, StopFault
+from fanet_mw.scenario.tables.radio import CHANNELS, Radio
 from fanet_mw.scenario.tables.routing import PROTOCOLS
 from fanet_mw.scenario.tables.sections import Section, meanings
 from fanet_mw.scenario.tables.world import FASTEST_AIR_M_S
@@ -40,8 +41,8 @@ def notes(scenario: Scenario) -> list[str]:
     """All notes on a scenario, one sentence each; empty if there are none."""
     kinds = (
         _after_the_end, _crossed_faults, _without_effect, _without_place, _still_waves, _beyond_the_vehicle,
-        _close_pads, _low_ceiling, _high_roofs, _empty_batteries, _out_of_reach, _odd_band, _wide_formation,
-        _keeping_clear_of_nobody, _guessed,
+        _close_pads, _low_ceiling, _high_roofs, _empty_batteries, _out_of_reach, _outside_the_area, _odd_band,
+        _wide_formation, _keeping_clear_of_nobody, _guessed,
     )  # fmt: skip
     return [note for kind in kinds for note in kind(scenario)]
 
@@ -180,16 +181,41 @@ def _beyond_the_vehicle(scenario: Scenario) -> Iterator[str]:
 def _out_of_reach(scenario: Scenario) -> Iterator[str]:
     """Nodes that hear nobody where they start: any if they rest, otherwise only all of them together."""
     radio, count = scenario.radio, scenario.node_count
-    if radio.channel != "range" or count < 2:
+    if radio.channel not in CHANNELS or count < 2:
         return
     from sim.world.environment.layout import positions
 
+    range_m = radio.range_m if radio.channel == "range" else _heard_m(radio)
     places = {NodeId(node): at for node, at in enumerate(positions(scenario), 1)}
-    alone = [
-        node for node, near in within_range(places, range_m=radio.range_m, reaches=scenario.reaches).items() if not near
-    ]
+    alone = [node for node, near in within_range(places, range_m=range_m, reaches=scenario.reaches).items() if not near]
     if alone and (len(alone) == count or scenario.mobility.model == "static"):
-        yield f"radio.range_m = {radio.range_m:g}: {len(alone)} of {count} nodes hear nobody where they start"
+        said = (
+            f"radio.range_m = {range_m:g}"
+            if radio.channel == "range"
+            else f"radio.channel = {radio.channel!r} reaches {range_m:.3g} m"
+        )
+        yield f"{said}: {len(alone)} of {count} nodes hear nobody where they start"
+
+
+def _heard_m(radio: Radio) -> float:
+    """How far a lucky frame is heard: with two standard deviations of shadowing and a gain of fading that is rare."""
+    from emulator.channel.fading import lift
+    from emulator.channel.link_budget import heard_m
+
+    return heard_m(radio, gain_dbi=_SIGMAS * radio.shadowing_db + 10 * math.log10(lift(radio)))
+
+
+def _outside_the_area(scenario: Scenario) -> Iterator[str]:
+    """Most UAVs start beyond the area in which they are to fly, and not from a base beside it."""
+    world = scenario.world
+    if scenario.mobility.model == "static" or any(world.base_m):
+        return
+    from sim.world.environment.layout import positions
+
+    starts = positions(scenario)[: scenario.nodes.count]
+    beyond = [at for at in starts if max(abs(at.east), abs(at.north)) > world.area_m / 2]
+    if 2 * len(beyond) > scenario.nodes.count:
+        yield f"world.area_m = {world.area_m:g}: {len(beyond)} of {scenario.nodes.count} nodes start outside the area"
 
 
 def _odd_band(scenario: Scenario) -> Iterator[str]:

@@ -99,6 +99,31 @@ def test_faults_that_end_others_unasked_or_end_none_are_noted(faults: tuple[str,
     assert [note[: len(said or "")] for note in found] == ([said] if said else [])
 
 
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        (["radio.channel=friis"], None),
+        (
+            ["radio.channel=friis", "radio.sensitivity_dbm=82"],
+            "radio.channel = 'friis' reaches 1 m: 45 of 45 nodes",
+        ),
+        (
+            ["radio.channel=log_distance", "radio.exponent=4"],
+            "radio.channel = 'log_distance' reaches 62.9 m: 45 of 45 n",
+        ),
+        (["radio.channel=log_distance", "radio.exponent=4", "radio.shadowing_db=12"], None),
+        (["mobility.model=random_waypoint", "world.area_m=2.5"], "world.area_m = 2.5: 44 of 45 nodes start outside"),
+        (["mobility.model=random_waypoint", "world.area_m=2.5km"], None),
+        (["mobility.model=random_waypoint", "world.area_m=900", "world.base_m=[1500, 0]"], None),
+        (["world.area_m=2.5"], None),
+    ],
+)
+def test_a_swarm_that_hears_nobody_or_starts_outside_its_area_is_noted(changes: list[str], said: str | None) -> None:
+    """A sign or a unit that is forgotten is a run of nobody, or over the area of a table."""
+    found = notes(catalog.find("flooding", changes))
+    assert [note[: len(said or "")] for note in found] == ([said] if said else [])
+
+
 def test_uavs_for_whom_the_plan_has_no_place_are_noted() -> None:
     few = ["world.area_m=1000", "nodes.spacing_m=50"]
     assert notes(catalog.find("rescue", [*few, "nodes.count=79"])) == []
@@ -204,7 +229,7 @@ def test_an_order_after_the_end_is_noted() -> None:
         (["clock.limit_s=3"], "clock.limit_s: no effect with clock.sync = 'none'"),
         (["mission.formation_m=30"], "mission.formation_m: no effect with mission.formation = 'none'"),
         (["radio.channel=friis", "radio.frequency_mhz=2437", "radio.tx_power_dbm=20"], None),
-        (["radio.channel=log_distance", "radio.exponent=4"], None),
+        (["radio.channel=log_distance", "radio.exponent=2.5"], None),
         (["routing.protocol=gossip", "routing.gossip_p=0.3"], None),
     ],
 )

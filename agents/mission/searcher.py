@@ -220,7 +220,7 @@ class Searcher:
             self._announcing.report_person(place, now_ns)
         self._announcing.give_up_doubles(now_ns, steady_m2=self._sightings.steady_m2)
         self._place_inside(now_ns)
-        self._announcing.tell(self._bidding.survivor, now_ns, unattended=self._bidding.unattended(now_ns))
+        self._announcing.tell(self._bidding.survivor, now_ns)
         if not self._return_home.leaves and self._orders.errand is None:
             self._bidding.bid(now_ns, delay_s=self._flight.take_off_s)
             self._bidding.choose(now_ns)

@@ -1,11 +1,10 @@
-"""What one UAV floods about survivors: its verdicts, and its estimate of a survivor to whom it flies, or nobody does.
+"""What one UAV floods about survivors: its verdicts, and estimates of those to whom it flies or whom it places best.
 
 A UAV that makes a verdict (confirmed, refuted, inside a building, among people, or a person without a phone) floods it
 three times, and hellos pass it on meanwhile. When a UAV does not seem to know a verdict, one in four of those that know
 it floods it again. A UAV that hears a lost one again floods all verdicts that were not flooded just now.
 """
 
-from collections.abc import Iterable
 from typing import Final
 
 from agents.mission.finding.identities import paired
@@ -150,9 +149,9 @@ class Announcing:
         self._heard_ns[survivor] = now_ns
         self._told.pop(survivor, None)
 
-    def tell(self, task: int | None, now_ns: int, *, unattended: Iterable[int] = ()) -> None:
-        """Flood the verdicts that are due, and the estimate of the survivor to whom this UAV flies (`task`); also that
-        of each survivor to whom nobody flies (`unattended`), if this UAV has the best one.
+    def tell(self, task: int | None, now_ns: int) -> None:
+        """Flood the verdicts that are due, the estimate of the survivor to whom this UAV flies, and those of others
+        whose phones it has received, if its estimates are the best: a responder may look elsewhere.
         """
         if self._meets_ns is not None and now_ns >= self._meets_ns:
             self._meets_ns = None
@@ -169,7 +168,7 @@ class Announcing:
                 del self._tellings[survivor]
         if task is not None:
             self._tell_estimate(task, now_ns)
-        for survivor in unattended:
+        for survivor in self._survivors.sought():
             if self._places_best(survivor):
                 self._tell_estimate(survivor, now_ns)
 

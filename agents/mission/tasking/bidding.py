@@ -36,6 +36,8 @@ back, and soon all leave.
 """
 _MEASURES_NS: Final = 30 * S
 """How long a responder is assumed to go round until a vague estimate has become a place."""
+_ELSEWHERE_M: Final = 50.0
+"""A responder begins anew if the estimate has moved so far: what it did not find, it has sought elsewhere."""
 _AGAIN_NS: Final = 20 * S
 """How long a UAV that has withdrawn its bid does not bid again."""
 _LONG_AGO_NS: Final = -(10**18)
@@ -97,6 +99,8 @@ class Bidding:
         """Whether this UAV has recorded that it flies to its present survivor."""
         self.survivor: int | None = None
         """The survivor to whom this UAV flies, or at whose place it is."""
+        self._due_for: Estimate | None = None
+        """The place to which this UAV flies as it was when it set out, or learned of another one."""
         self._due_ns = _LONG_AGO_NS
         """The instant at which it should have arrived there."""
 
@@ -155,18 +159,28 @@ class Bidding:
                 if self._node in self._winners(survivor, now_ns)
             ]
             if won:
-                distance_m, self.survivor = min(won)
+                _, self.survivor = min(won)
                 self._announced = False
                 if now_ns - self._approach.arrived_ns.get(self.survivor, now_ns) > self._patience_ns:
                     self._approach.forget(self.survivor)
-                place = self._survivors.by_id[self.survivor].place()
-                measures_ns = _MEASURES_NS if place is not None and place.is_vague else 0
-                self._due_ns = now_ns + measures_ns
-                self._due_ns += round(distance_m / self._cruise_m_s * S) if math.isfinite(distance_m) else 0
+                self._due_for = self._survivors.by_id[self.survivor].place()
+                self._due_ns = self._due_at(self._due_for, now_ns)
         if self.survivor is not None:
             self._approach.share([node for node in self._winners(self.survivor, now_ns) if node != self._node])
             if not self._announced:
                 self._announce(self.survivor, now_ns)
+
+    def _due_at(self, place: Estimate | None, now_ns: int) -> int:
+        """The instant by which this UAV should be at a survivor's place, however long it was out for the survivor."""
+        if place is None:
+            return now_ns
+        flies_s = place.distance_m(self._own_motion.position) / self._cruise_m_s
+        return now_ns + round(flies_s * S) + (_MEASURES_NS if place.is_vague else 0)
+
+    def _is_news(self, place: Estimate) -> bool:
+        """True for a place that is exact, and another one than this UAV went to until now."""
+        before = self._due_for
+        return not place.is_vague and (before is None or before.is_vague or place.distance_m(before.at) > _ELSEWHERE_M)
 
     def _reconsider(self, survivor: int, now_ns: int) -> None:
         """Give up the present survivor if the auction is lost and this UAV is not nearly there. Give it up and withdraw
@@ -174,6 +188,9 @@ class Bidding:
         """
         arrived_ns, patience_ns = self._approach.arrived_ns.get(survivor), self._patience_ns
         place = self._survivors.by_id[survivor].place()
+        if place is not None and self._is_news(place):
+            self._due_for, self._due_ns, arrived_ns = place, self._due_at(place, now_ns), None
+            self._approach.forget(survivor)
         nearly_there = arrived_ns is None and self._formation.finishes(place, now_ns)
         lost = self._node not in self._winners(survivor, now_ns) and not nearly_there
         if arrived_ns is None and self._formation.plan is not None and not self._formation.is_taken_up(now_ns):
@@ -236,10 +253,6 @@ class Bidding:
         """The UAVs that have won a task, as far as this one knows; `first`: of each task the one that arrives first."""
         most = 1 if first else None
         return {node for survivor in self._survivors.sought() for node in self._winners(survivor, now_ns)[:most]}
-
-    def unattended(self, now_ns: int) -> list[int]:
-        """The survivors for whom nobody has won the auction, as far as this UAV knows."""
-        return [survivor for survivor in self._survivors.sought() if not self._winners(survivor, now_ns)]
 
     def is_first(self, now_ns: int) -> bool:
         """True if this UAV flies to a survivor, and no other one arrives there before it by what they have bid."""

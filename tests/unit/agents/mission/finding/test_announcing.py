@@ -127,7 +127,7 @@ def test_those_who_hear_it_take_turns() -> None:
     [(True, None, 1), (True, 90.0, 1), (True, 5.0, 0), (False, None, 0)],
     ids=["nobody has told", "somebody knows less", "somebody knows as much", "has not received the phone"],
 )
-def test_where_nobody_responds_who_receives_a_phone_and_places_it_best_tells_its_estimate_once(
+def test_who_receives_a_phone_and_places_it_best_tells_its_estimate_once_whoever_responds(
     hears_it: bool, told_m: float | None, tells: int
 ) -> None:
     board, truth = Board(FOLLOWER, Enu(0, 0, UP_M)), Enu(100, 20, 0)
@@ -138,5 +138,5 @@ def test_where_nobody_responds_who_receives_a_phone_and_places_it_best_tells_its
         told = Found(1, 1, 150, 20, told_m**2, 0, told_m**2, NodeId(3), Standing.ESTIMATED)
         board.survivors.on_found(told, now_ns=0)
     for second in range(5):
-        board.announcing.tell(None, second * S, unattended=[1])
+        board.announcing.tell(None, second * S)
     assert len(estimated(board)) == tells

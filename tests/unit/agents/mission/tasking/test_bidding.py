@@ -5,9 +5,9 @@ from search_board import FOLLOWER, LINE, TAKEN_UP_NS, UP_M, Board, lane_of
 
 from agents.mission.finding.phone_localization import Estimate
 from fanet_mw.trace import Approaching, Arrived, Located
-from fanet_mw.units import US, Enu, S
+from fanet_mw.units import US, Enu, NodeId, S
 from fanet_mw.wire.search_messages import Bid
-from fanet_mw.wire.survivors import Survivor
+from fanet_mw.wire.survivors import Found, Standing, Survivor
 
 NOW_NS = TAKEN_UP_NS + 20 * S
 
@@ -215,6 +215,21 @@ def test_a_responder_that_does_not_come_in_time_takes_its_bid_back() -> None:
     board.tasks.bid(later_ns)
     assert board.tasks.survivor is None
     assert [bid.eta_ds for bid in board.tasks.bids_to_tell(now_ns=later_ns)] == [0xFFFF]
+
+
+@pytest.mark.parametrize(("north_m", "stays"), [(None, False), (90, True), (10, False)])
+def test_a_responder_that_is_told_of_another_place_has_the_time_of_that_way(north_m: float | None, stays: bool) -> None:
+    board = Board(LINE, Enu(0, 0, UP_M), plan=None)
+    board.hear(1, Enu(10, 0, 0), range(1, 5), now_ns=NOW_NS)
+    board.tasks.bid(NOW_NS)
+    board.tasks.choose(NOW_NS)
+    board.goal.at(board.tasks.survivor, NOW_NS)
+    if north_m is not None:
+        told = Found(NOW_NS // US + 1, 1, 10, north_m, 4, 0, 4, NodeId(3), Standing.ESTIMATED)
+        board.survivors.on_found(told, now_ns=NOW_NS + 44 * S)
+    for after_s in (44, 50):
+        board.tasks.choose(NOW_NS + after_s * S)
+    assert (board.tasks.survivor == 1) == stays
 
 
 @pytest.mark.parametrize(("plan", "located", "most"), [(False, False, 6), (False, True, 3), (True, False, 3)])

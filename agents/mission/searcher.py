@@ -34,7 +34,12 @@ from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.navigation.silent_neighbors import HeardByRadio, SilentNeighbors
 from agents.mission.orders import KnownOrders, record_of
 from agents.mission.outbox import Outbox
-from agents.mission.search_formation.formation_planner import NOTICE_IN_ROUNDS_NS, NOTICE_NS, FormationPlanner
+from agents.mission.search_formation.formation_planner import (
+    NOTICE_IN_ROUNDS_NS,
+    NOTICE_NS,
+    FormationPlanner,
+    larger,
+)
 from agents.mission.search_formation.pattern import Pattern, fastest, fitted, of_few
 from agents.mission.search_formation.plan_exchange import PlanExchange
 from agents.mission.search_formation.roll_call import RollCall
@@ -117,16 +122,17 @@ class Searcher:
         nodes = scenario.nodes
         silent = None if radio is None else SilentNeighbors(radio, neighbors, own_motion, obstacles, reach_m=reach_m)
         self._roll_call = roll_call = RollCall(node, hello_interval_s=scenario.routing.hello_interval_s, silent=silent)
+        notice_ns = NOTICE_IN_ROUNDS_NS if scenario.routing.protocol == "rounds" else NOTICE_NS
         planner = FormationPlanner(
             node, roll_call, expected=nodes.count, deploy_speed_m_s=_DEPLOY * least_m_s,
-            notice_ns=NOTICE_IN_ROUNDS_NS if scenario.routing.protocol == "rounds" else NOTICE_NS,
+            notice_ns=round(larger(nodes.count) * notice_ns),
             take_off_ns=take_off_ns(nodes.altitude_m) if nodes.on_ground else 0, turns_ns=turns_ns,
             random=stream(scenario.seed, "plan", node).random,
             of_few=lambda count, now_ns: None if self._is_swept(now_ns) else _of_few(scenario, count),
         )  # fmt: skip
         self._plans = PlanExchange(
             node, planner, roll_call, place, own_motion, outbox,
-            pattern=formation(scenario, nodes.count), random=self._random,
+            pattern=formation(scenario, nodes.count), random=self._random, uavs=nodes.count,
         )  # fmt: skip
         self._reception = PhoneReception(scenario, node, survivors, own_motion, outbox, neighbors)
         self._sightings = Sightings(scenario, node, survivors, own_motion, outbox)

@@ -18,7 +18,11 @@ from fanet_mw.units import US, Enu, NodeId, S
 from fanet_mw.wire.search_plan import Search, SearchStatus
 
 STATUS_S: Final = 12.0
-"""The interval at which a UAV sends its status."""
+"""The interval at which a UAV of a swarm of up to `_MANY` sends its status."""
+_MANY: Final = 60
+"""All turns carry what all say: of more UAVs each sends its status less often, and a flood takes longer."""
+_SELDOM: Final = 3.0
+"""The greatest share by which it does: who says nothing for `_LOST_NS` is taken to have gone."""
 _LOST_NS: Final = 70 * S
 """A UAV from which nothing was received for this time does not plan any more, and if it is lost has no right to its
 place.
@@ -49,6 +53,11 @@ apart: survivors among the UAVs are found meanwhile, because nobody passes there
 _LEAVE_NS: Final = 6 * S
 """When this time has passed since a UAV left, all that leave together, as at the end of a search, have said so."""
 _REVISION_BITS: Final = 16
+
+
+def larger(uavs: int) -> float:
+    """By how much more rarely a UAV of so many sends its status, and longer a flood takes, than in a small swarm."""
+    return min(_SELDOM, max(1.0, uavs / _MANY))
 
 
 class _HeardUav(NamedTuple):

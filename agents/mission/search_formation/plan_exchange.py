@@ -6,7 +6,7 @@ from typing import Final
 from agents.mission.navigation.neighbor_motions import falls
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox, OutgoingPacket
-from agents.mission.search_formation.formation_planner import STATUS_S, FormationPlanner
+from agents.mission.search_formation.formation_planner import STATUS_S, FormationPlanner, larger
 from agents.mission.search_formation.pattern import Pattern
 from agents.mission.search_formation.roll_call import RollCall
 from agents.mission.search_formation.search_place import SearchPlace
@@ -17,7 +17,7 @@ from fanet_mw.wire.search_messages import Roll
 from fanet_mw.wire.search_plan import Search, SearchStatus
 
 _FIRST_STATUS_S: Final = 2
-"""A UAV sends its first status at a random instant within this time after its start."""
+"""A UAV of a small swarm sends its first status at a random instant within this time after its start."""
 _ALARM_NS: Final = 2 * S
 """The least time between two floods by which a UAV tells all who is lost."""
 _SPREAD_NS: Final = 400 * MS
@@ -39,13 +39,17 @@ class PlanExchange:
         *,
         pattern: Pattern | None,
         random: Callable[[], float],
+        uavs: int,
     ) -> None:
-        """`pattern`: the formation to plan, if this UAV has to; None if the UAVs are too few for one."""
+        """`pattern`: the formation to plan, if this UAV has to; None if the UAVs are too few for one. `uavs`: their
+        number, by which each sends its status more or less often.
+        """
         self._node = node
         self._planner, self._place, self._roll_call = planner, place, roll_call
         self._own_motion, self._outbox = own_motion, outbox
         self._pattern = pattern
         self._random = random
+        self._status_ns, self._first_ns = STATUS_S * larger(uavs) * S, _FIRST_STATUS_S * larger(uavs) * S
         self._next_status_ns = 0
         self._adopted_ns = 0
         """The instant at which this UAV began to follow its plan."""
@@ -58,7 +62,7 @@ class PlanExchange:
         """True while this UAV is out of its place for a survivor."""
 
     def start(self, now_ns: int) -> None:
-        self._next_status_ns = now_ns + round(self._random() * _FIRST_STATUS_S * S)
+        self._next_status_ns = now_ns + round(self._random() * self._first_ns)
 
     def review(self, percent: int, now_ns: int) -> None:
         """Send a status if one is due, plan if this UAV is the planner, and put new plans into the outbox."""
@@ -99,7 +103,7 @@ class PlanExchange:
         )
         self._planner.status(status, now_ns=now_ns)
         self._outbox.packets.append(OutgoingPacket(status.encode_frame(self._node)))
-        self._next_status_ns = now_ns + round((0.8 + 0.4 * self._random()) * STATUS_S * S)
+        self._next_status_ns = now_ns + round((0.8 + 0.4 * self._random()) * self._status_ns)
 
     def be_absent(self, percent: int, now_ns: int, *, goes: bool) -> None:
         """Tell all when this UAV goes out of its place for a survivor (`goes`), and when it is back."""

@@ -25,7 +25,9 @@ NOW_NS = TAKEN_UP_NS + 40 * S
 class Exchange:
     """One UAV's part in the exchange, with the plan."""
 
-    def __init__(self, node: NodeId, *, waits: float = 0.5, silent: SilentNeighbors | None = None) -> None:
+    def __init__(
+        self, node: NodeId, *, waits: float = 0.5, silent: SilentNeighbors | None = None, uavs: int = COUNT
+    ) -> None:
         """`waits`: all its random numbers."""
         self.out, self.motion = Outbox(), OwnMotion(lane_of(node, NOW_NS), OPEN)
         self.place = SearchPlace(node, self.motion, reach_m=REACH_M)
@@ -35,8 +37,9 @@ class Exchange:
             of_few=lambda *_: None, random=lambda: 0.5,
         )  # fmt: skip
         self.plans = PlanExchange(
-            node, planner, roll_call, self.place, self.motion, self.out, pattern=None, random=lambda: waits
-        )
+            node, planner, roll_call, self.place, self.motion, self.out,
+            pattern=None, random=lambda: waits, uavs=uavs,
+        )  # fmt: skip
         self.plans.on_plan(PLAN, now_ns=NOW_NS)
 
     def said(self) -> list[SearchStatus]:
@@ -57,10 +60,13 @@ def test_it_is_absent_from_when_it_goes_until_it_is_near_its_place_again() -> No
     assert [status.absent for status in exchange.said()] == [True, False]
 
 
-def test_a_status_goes_out_the_instant_it_is_due() -> None:
-    exchange = Exchange(LINE, waits=0.25)
+@pytest.mark.parametrize(("uavs", "times"), [(COUNT, 1), (120, 2), (480, 3)])
+def test_a_status_goes_out_the_instant_it_is_due_and_of_many_uavs_each_says_it_less_often(
+    uavs: int, times: int
+) -> None:
+    exchange = Exchange(LINE, waits=0.25, uavs=uavs)
     exchange.plans.start(NOW_NS)
-    for due_ns in (NOW_NS + S // 2, NOW_NS + S // 2 + round(0.9 * STATUS_S * S)):
+    for due_ns in (NOW_NS + times * S // 2, NOW_NS + times * (S // 2 + round(0.9 * STATUS_S * S))):
         exchange.plans.review(80, due_ns - 1)
         assert exchange.said() == []
         exchange.plans.review(80, due_ns)

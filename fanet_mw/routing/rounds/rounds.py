@@ -352,7 +352,10 @@ class RoundFlooding(RoutingProtocol):
         if hello is not None and self._hello_waits >= PATIENT_TURNS:
             room -= self._add_hello(together)
         kept = self._law.kept_bytes if self._topology.news else 0
-        for packet in self._spreading.wanted(self._neighbors(now_ns), gone=self._gone, start_ns=turn_ns):
+        neighbors = self._neighbors(now_ns)
+        for key in self._spreading.spared(neighbors):
+            self._tell_held(key, now_ns)
+        for packet in self._spreading.wanted(neighbors, gone=self._gone, start_ns=turn_ns):
             if self._expired(packet, turn_ns):
                 continue
             size = len(packet.frame)
@@ -476,12 +479,11 @@ class RoundFlooding(RoutingProtocol):
         if slot_ns < now_ns or lost:
             self._seek_slot(max(slot_ns, now_ns + self._lead_ns), now_ns)
             return
-        room, together = self._timing.slot_bytes, list[Packet]()
-        for urgent in self._spreading.take_hasty(self._timing.hasty_bytes):
+        room, together, neighbors = self._timing.slot_bytes, list[Packet](), self._neighbors(now_ns)
+        for urgent in self._spreading.take_hasty(self._timing.hasty_bytes, neighbors):
             if not self._expired(urgent, slot_ns):
                 room -= len(urgent.frame)
                 together.append(urgent)
-        neighbors = self._neighbors(now_ns)
         while (packet := self._spreading.next_bulk(neighbors, gone=self._gone, start_ns=slot_ns)) is not None:
             if self._expired(packet, slot_ns):
                 continue

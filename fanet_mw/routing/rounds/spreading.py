@@ -1,6 +1,6 @@
 """What one node passes on: each packet until every neighbor is known to have it.
 
-    urgent   heard -> own bulk slot, if one comes first -> own next turn
+    urgent   heard -> own bulk slot, if one comes first -> own next turn, unless every neighbor has it by then
                    -> a neighbor is not known to have it a round later -> own turn again
     bulk     heard -> an instant in a bulk window -> every neighbor hears one that sent it: not sent; else sent
                    -> a round later -> a neighbor is not known to have it: sent (again)
@@ -254,6 +254,17 @@ class Spreading:
 
     # --- what is sent ---------------------------------------------------------------------------------------------
 
+    def spared(self, neighbors: int) -> list[int]:
+        """The keys of urgent packets that no neighbor lacks, though this node has not sent them: they are done."""
+        if self._lossy or not neighbors:
+            return []
+        served = neighbors & ~self._deaf()
+        entries = [(key, self._entries[key]) for key in self._waiting]
+        found = [(key, entry) for key, entry in entries if not entry.sent and not served & ~entry.having]
+        for key, entry in found:
+            self._settle(key, entry)
+        return [key for key, _ in found]
+
     def wanted(self, neighbors: int, *, start_ns: int, gone: int = 0) -> list[Packet]:
         """The urgent packets for a turn; forgets what nobody lacks, repeats nothing for `gone` ones."""
         patient_ns = start_ns - self._patience_ns
@@ -312,11 +323,13 @@ class Spreading:
         self._hasty.pop(key, None)
         return entry.sent
 
-    def take_hasty(self, room: int) -> list[Packet]:
+    def take_hasty(self, room: int, neighbors: int) -> list[Packet]:
         """Urgent packets that go in a bulk slot now, as they fit, most urgent first; they go in the turn as well."""
         taken = []
         for entry in sorted(self._hasty.values(), key=lambda entry: entry.rank):
-            if len(entry.packet.frame) <= room:
+            if not self._lossy and neighbors and not neighbors & ~entry.having:
+                del self._hasty[_key(entry.packet)]
+            elif len(entry.packet.frame) <= room:
                 room -= len(entry.packet.frame)
                 taken.append(entry.packet)
                 del self._hasty[_key(entry.packet)]

@@ -105,6 +105,20 @@ def test_an_urgent_packet_goes_in_the_bulk_slot_before_the_turn_and_in_the_turn(
     assert any(born_ns < start_ns < turn_ns for start_ns in starts)
 
 
+def test_an_urgent_packet_that_all_neighbors_sent_is_told_of_and_not_sent(make_node: MakeNode) -> None:
+    for others, sends in (((), True), ((NEW,), False)):
+        node = make_node()
+        run(node, 1 * S)
+        for seq, src in ((1, NEAR), (2, NEW)):
+            hear(node, seq, src=src, at_ns=1 * S, kind=Kind.ROUND, priority=PRIORITY_CONTROL)
+        for src in (NEAR, *others):
+            hear(node, 9, src=src, at_ns=1 * S, priority=PRIORITY_REPORT, origin=None if src == NEAR else NEAR)
+        sent = run(node, 1 * S + RoundTiming.of(node.scenario).period_ns, from_ns=1 * S)
+        frames = [packet for each in sent for packet in unbundle(each.frame)]
+        assert any(wire.decode_header(packet).seq == 9 for packet in frames) == sends
+        assert (HeldPacket(9, NEAR) in held_in(sent)) != sends
+
+
 def states(node: int, heard: Sequence[int], *, epoch: int) -> bytes:
     """What a node says about whom it hears."""
     bits = sum(1 << (one - 1) for one in heard)

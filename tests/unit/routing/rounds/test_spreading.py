@@ -376,16 +376,16 @@ def test_in_a_bulk_slot_go_the_urgent_packets_that_fit_and_they_go_in_the_turn_a
     for seq, priority in ((1, wire.PRIORITY_REPORT), (2, wire.PRIORITY_SAFETY), (3, wire.PRIORITY_REPORT)):
         made.push(packet(seq, priority=priority, origin_us=seq), src=None, now_ns=0)
     size = len(packet(1).frame)
-    assert [one.header.seq for one in made.take_hasty(2 * size)] == [2, 1]
+    assert [one.header.seq for one in made.take_hasty(2 * size, nodes((2, 3)))] == [2, 1]
     assert made.bulk_due_ns(nodes((2, 3))) == 0
-    assert [one.header.seq for one in made.take_hasty(size - 1)] == []
-    assert [one.header.seq for one in made.take_hasty(size)] == [3]
-    assert made.take_hasty(10 * size) == []
+    assert [one.header.seq for one in made.take_hasty(size - 1, nodes((2, 3)))] == []
+    assert [one.header.seq for one in made.take_hasty(size, nodes((2, 3)))] == [3]
+    assert made.take_hasty(10 * size, nodes((2, 3))) == []
     assert made.bulk_due_ns(nodes((2, 3))) is None
     assert sent_in_turn(made, 1) == [2, 1, 3]
     made.push(packet(4), src=None, now_ns=0)
     made.went_ahead(packet(4))
-    assert made.take_hasty(10 * size) == []
+    assert made.take_hasty(10 * size, nodes((2, 3))) == []
     assert sent_in_turn(made, 2, neighbors=(2,)) == [2, 4, 1, 3], "new before again, if as urgent"
 
 
@@ -417,3 +417,23 @@ def test_what_was_taken_lately_is_told_whether_it_is_kept_or_done() -> None:
     assert made.made_ns(key_of_packet(old)) == 7000
     assert made.made_ns(keys[0]) == 0
     assert made.made_ns(12345) == -math.inf
+
+
+def test_an_urgent_packet_that_every_neighbor_has_before_the_turn_is_not_sent_but_told_of() -> None:
+    made, key = spreading(), key_of_packet(packet(1))
+    made.push(packet(1), src=2, now_ns=0)
+    assert made.spared(nodes((2, 3))) == [], "3 lacks it, as far as this node knows"
+    made.on_copy(key, 3, neighbors=nodes((2, 3)), now_ns=10)
+    assert made.take_hasty(1000, nodes((2, 3))) == []
+    assert made.spared(nodes((2, 3))) == [key]
+    assert sent_in_turn(made, 1) == []
+    made.push(packet(2), src=None, now_ns=20)
+    assert made.spared(0) == [], "whoever comes near may lack it"
+
+
+def test_where_frames_are_lost_at_random_each_node_sends_once_so_that_all_see_whom_they_hear() -> None:
+    made = spreading(lossy=True)
+    made.push(packet(1), src=2, now_ns=0)
+    made.on_copy(key_of_packet(packet(1)), 3, neighbors=nodes((2, 3)), now_ns=10)
+    assert made.spared(nodes((2, 3))) == []
+    assert sent_in_turn(made, 1) == [1]

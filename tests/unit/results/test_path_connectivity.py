@@ -3,7 +3,7 @@
 import pytest
 from kit import MakeScenario
 
-from fanet_mw.trace import ProcessEnded, ProcessStarted
+from fanet_mw.trace import Posed, ProcessEnded, ProcessStarted
 from fanet_mw.units import S
 from sim.results.links_over_time import LinksOverTime, connectivity
 from sim.results.outcome import Outcome
@@ -24,6 +24,15 @@ def test_who_never_says_where_it_is_stays_where_it_was_put(make_scenario: MakeSc
     links = LinksOverTime(Outcome(make_scenario(**keys), "virtual", 1.0, [], {}))
     assert links.at(0).tolist() == [[True, True, False], [True, True, True], [False, True, True]]
     assert links.at(0) is links.at(0)
+
+
+def test_who_is_in_reach_at_an_instant_has_a_link_in_the_seconds_before_and_after_it(
+    make_scenario: MakeScenario,
+) -> None:
+    keys = {"nodes.count": 2, "nodes.spacing_m": 900, "nodes.layout": "line", "radio.range_m": 250}
+    records = [Posed(second * S, 2, -250.0 if second == 2 else 450.0, 0.0, 50.0) for second in (1, 2, 3)]
+    links = LinksOverTime(Outcome(make_scenario(**keys), "virtual", 1.0, records, {}))
+    assert [bool(links.at(second)[0, 1]) for second in range(4)] == [False, True, True, False]
 
 
 def test_the_post_on_the_ground_is_as_far_in_reach_as_its_antenna_makes_it(make_scenario: MakeScenario) -> None:

@@ -108,3 +108,10 @@ def test_the_bound_is_asked_of_those_that_were_in_reach_within_it(scenario: Scen
     assert (found["pdr"], found["within_share"]) == (1.0, 1.0)
     late = reachable(scenario, flight(0), packet(2, (2, 0.1), (3, 2.5), bound_ms=500))
     assert (late["pdr"], late["within_share"]) == (1.0, 0.5)
+
+
+def test_a_report_is_not_meant_for_the_node_that_made_it(scenario: Scenario) -> None:
+    came = [Delivered(2 * S + 9, node, 1, 1, 9, 1) for node in (2, 3)]
+    records = sorted([*flight(0), Generated(2 * S, 1, 1, "report", 100), *came], key=lambda record: record.t_ns)
+    summary = summarize(Outcome(scenario, "virtual", 1.0, records, {}), trace_sha256="")
+    assert (summary["reachable"]["report"]["share"], summary["reachable"]["report"]["pdr"]) == (1.0, 1.0)

@@ -51,3 +51,10 @@ def test_a_fault_of_the_post_on_the_ground_ends_the_one_with_its_label_too(make_
     for now_s, off_m in enumerate((5.0, 0.0)):
         mishaps.due(now_s * S)
         assert mishaps.offset_m[0, 0] == off_m
+
+
+def test_what_befalls_a_receiver_that_the_post_on_the_ground_does_not_have_is_passed_over(make_scenario: Any) -> None:
+    mishaps = Mishaps(make_scenario(**{"nodes.count": 3, "ground.at_m": (0.0, -150.0)}))
+    mishaps.add(gps(5.0, node=4), 0)
+    assert [*mishaps.due(S)] == []
+    assert not mishaps.offset_m.any()

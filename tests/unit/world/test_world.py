@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from fanet_mw.bus.messages import Gps, Poses, Setpoint, WifiScan
+from fanet_mw.bus.radio_control import Mishap, MishapKind
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Collided, Posed
-from fanet_mw.units import MS, Enu, S
+from fanet_mw.units import MS, STILL, Enu, NodeId, S
 from sim.world.world import WorldActor
 
 NAMES = Topics("w")
@@ -103,6 +104,23 @@ def test_a_swarm_that_stands_has_positions_in_the_trace_from_when_one_of_it_is_s
     assert [record.node for record in last] == [1, 2, 3, 4]
     assert last[1].t_ns == 60 * S
     assert (last[1].east_m, last[1].north_m) == pytest.approx((0, 0), abs=10), "as far as its receiver tells"
+
+
+@pytest.mark.parametrize(("share", "left"), [(0.8, 0.3), (0.2, 0.2)])
+def test_a_weak_battery_is_no_stronger_than_before(make_scenario: MakeScenario, share: float, left: float) -> None:
+    made = world(make_scenario, **{"world.engine": "rotors", "world.charge": [0.3, 0.3], "sensors.battery_hz": 1})
+    made.receive(NAMES.radio_control, Mishap("weak", NodeId(2), MishapKind.BATTERY, Enu(share, 0, 0), 0), 0)
+    advance(made, 1 * S)
+    assert made._drain is not None
+    assert made._drain.batteries.charge[1] == pytest.approx(left, abs=0.01)
+
+
+def test_who_falls_by_a_fault_tells_where_it_is_until_it_hits_the_ground(make_scenario: MakeScenario) -> None:
+    made = world(make_scenario, **{"world.gps_hz": 5})
+    advance(made, 2 * S)
+    made.receive(NAMES.radio_control, Mishap("falls", NodeId(2), MishapKind.CRASH, STILL, 0), 2 * S)
+    told_ns = [at_ns for at_ns, topic, _ in advance(made, 12 * S) if topic == NAMES.sensor(2, "gps")]
+    assert 4 * S < max(told_ns) < 7 * S, "from 50 m"
 
 
 def test_scans_of_the_uavs_are_spread_over_the_interval(make_scenario: MakeScenario) -> None:

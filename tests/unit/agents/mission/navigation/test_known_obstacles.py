@@ -122,6 +122,15 @@ def test_nobody_flies_into_an_area_that_is_forbidden_however_high() -> None:
     assert places[-1].minus(Enu(150, 0, 500)).norm() < 5.0
 
 
+def test_an_area_that_is_forbidden_in_flight_is_flown_around_where_there_is_nothing_else() -> None:
+    start, goal, obstacles = Enu(-100, 1, 60), Enu(100, 0, 60), KnownObstacles(NO_MAP)
+    assert obstacles.way_to(start, goal, STILL, now_ns=0) is None
+    obstacles.close(0.0, 0.0, 30.0)
+    places = flown(obstacles, start, goal, seconds=60)
+    assert min(at.horizontal() for at in places) > 30
+    assert places[-1].horizontal_to(goal) < 2
+
+
 def test_a_lost_uav_that_hovers_is_flown_around_at_its_height_only() -> None:
     obstacles, place = KnownObstacles(NO_MAP), Enu(0.0, 0.0, 65.0)
     obstacles.hovering = [(place, 7.5)]

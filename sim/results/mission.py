@@ -49,6 +49,8 @@ _RETURNING: Final = "return"
 """The flight mode of a UAV that its flight controller brings home."""
 _CELL_M: Final = 25.0
 """The length of the sides of the cells in which the area is counted, or nearly: a whole number of them fits."""
+_MOST_CELLS: Final = 2_000
+"""Along a side: those of areas beyond 50 km are larger, or a million metres would take gigabytes."""
 _MOST_DECADES: Final = 12.0
 """The greatest range of a phone's receiver is 10^12 m, farther than anything is apart; its square is a number."""
 _NEARLY_ALL: Final = 0.95
@@ -330,7 +332,7 @@ class _Cells:
 
     def __init__(self, scenario: Scenario) -> None:
         half = scenario.world.area_m / 2
-        count = max(1, round(2 * half / _CELL_M))
+        count = min(_MOST_CELLS, max(1, round(2 * half / _CELL_M)))
         self._axis = (np.arange(count) + 0.5) * (2 * half / count) - half
         self._seen = np.zeros((count, count), bool)
 
@@ -388,9 +390,9 @@ class PhotographedCells(_Cells):
         """UAVs were at these places; over hills they are taken to be at the height of the search."""
         for east, north, up in at:
             above_m = min(up, self._most_up_m)
-            near_e = np.abs(self._axis - east) <= above_m * self._tan_east
-            near_n = np.abs(self._axis - north) <= above_m * self._tan_north
-            self._seen |= near_n[:, None] & near_e
+            near_e = np.flatnonzero(np.abs(self._axis - east) <= above_m * self._tan_east)
+            near_n = np.flatnonzero(np.abs(self._axis - north) <= above_m * self._tan_north)
+            self._seen[np.ix_(near_n, near_e)] = True
 
 
 UNHEARD: Final = "not heard"

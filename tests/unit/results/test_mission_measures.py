@@ -22,7 +22,7 @@ from fanet_mw.trace import (
 )
 from fanet_mw.units import S
 from fanet_mw.wire.survivors import person_id
-from sim.results.mission import mission
+from sim.results.mission import CoveredCells, PhotographedCells, mission
 from sim.scenarios import catalog
 
 KEYS: dict[str, Any] = {
@@ -34,6 +34,15 @@ KEYS: dict[str, Any] = {
 def measured(records: Sequence[Record], ground: dict[str, Any] | None = None, **mission_keys: float) -> dict[str, Any]:
     keys = {**KEYS, "mission": {**KEYS["mission"], **mission_keys}, "ground": ground or {}}
     return mission(Scenario(**keys), records)
+
+
+def test_the_cells_of_the_largest_area_fit_into_memory_and_are_counted() -> None:
+    """Metres in place of kilometres took gigabytes and minutes after the run, for figures of which nobody had asked."""
+    largest = Scenario(**{**KEYS, "world": {"area_m": 1e6}})
+    for cells in (CoveredCells(largest), PhotographedCells(largest)):
+        assert cells.seen.size == 2_000**2
+        cells.add([(250.0, 250.0, 10_000.0)])
+    assert CoveredCells(Scenario(**KEYS)).seen.size == 20**2
 
 
 def at(t_s: int, *easts: float) -> list[Record]:

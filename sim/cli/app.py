@@ -13,7 +13,7 @@ from typing import Final
 from cyclopts import App, CycloptsError, UnusedCliTokensError, _convert
 
 from fanet_mw import __version__
-from fanet_mw.errors import FanetError
+from fanet_mw.errors import ConfigError, FanetError
 from fanet_mw.hosts import interrupts
 from sim.cli import (
     air,
@@ -92,6 +92,13 @@ def changes_last(words: Sequence[str]) -> list[str]:
     return [*rest, "--set", *changes] if changes and "--" not in words else list(words)
 
 
+def require_values(words: Sequence[str]) -> None:
+    """Raise ConfigError for an option whose value is empty, as that of a variable of the shell which is not set."""
+    for option, value in zip(words, [*words[1:], "-"], strict=True):
+        if option.startswith("--") and (not value or re.fullmatch("--[a-z-]+=", option)):
+            raise ConfigError(f"{option.rstrip('=')}: its value is empty")
+
+
 def refused(why: str) -> int:
     """Print why a request could not be met, in few short lines; returns the exit code for that."""
     from rich.text import Text
@@ -135,6 +142,7 @@ def main() -> None:
         sys.stderr.write("fanet: python -OO has removed what the commands and options mean; without -OO it is shown\n")
     try:
         require_for(sys.argv[1:])
+        require_values(sys.argv[1:])
         with interrupts.undisguised():
             words = changes_last(sys.argv[1:])
             code = app(words, result_action="return_value", exit_on_error=False, print_error=False)

@@ -24,11 +24,13 @@ def write_dialect(folder: Path) -> Path:
     target = folder / "v1.0"
     ours, theirs = files("fanet_mw.dialect"), files("pymavlink.dialects.v20")
     try:
-        target.mkdir(parents=True, exist_ok=True)
-        for name, text in _with_included(ours / "fanet.xml", theirs).items():
-            replace_file(target / name, text.encode())
+        definitions = _with_included(ours / "fanet.xml", theirs)
     except FileNotFoundError as error:
         raise ConfigError(f"{error.filename}: is missing: install pymavlink anew") from error
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+        for name, text in definitions.items():
+            replace_file(target / name, text.encode())
     except OSError as error:
         raise ConfigError(f"{target}: cannot be written: {error.strerror}") from error
     return target / "fanet.xml"

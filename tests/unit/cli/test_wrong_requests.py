@@ -11,7 +11,7 @@ from fanet_mw.application import Application
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import ConfigError, HostError
 from fanet_mw.scenario import config
-from sim.cli.app import app, changes_last, misread
+from sim.cli.app import app, changes_last, misread, require_values
 from sim.results.files import finish
 from sim.run.virtual import simulate
 
@@ -81,6 +81,18 @@ def test_words_too_many_are_named_and_a_change_without_set_is_known_as_one(words
     with pytest.raises(CycloptsError) as caught:
         app(words.split(), result_action="return_value", exit_on_error=False, print_error=False)
     assert misread(caught.value) == f"not understood: {said}"
+
+
+@pytest.mark.parametrize("words", [["simulate", "quick", "--out", ""], ["launch", "--out=", "quick"]])
+def test_an_option_whose_value_is_empty_is_refused(words: list[str]) -> None:
+    """`--out "$RUNS"` without such a variable wrote the run into the working folder, with `--force` over another."""
+    with pytest.raises(ConfigError, match="--out: its value is empty"):
+        require_values(words)
+    require_values(["simulate", "quick", "--out", ".", "--set", "world.heightmap=", "--set=world.heightmap=", "--json"])
+
+
+def test_a_folder_for_the_dialect_that_cannot_be_made_is_no_fault_of_pymavlink() -> None:
+    assert refusal("dialect", "/proc/nowhere") == "/proc/nowhere/v1.0: cannot be written: No such file or directory"
 
 
 def test_a_link_from_a_node_to_itself_is_refused_in_words() -> None:

@@ -226,6 +226,19 @@ def test_who_was_recalled_and_is_then_sent_to_a_place_flies_there(
     assert flight.at.horizontal_to(Enu(0.0, 300.0, 0.0)) < 90
 
 
+def test_who_was_sent_to_a_place_stays_there_when_the_search_is_over(make_scenario: Callable[..., Scenario]) -> None:
+    modes = []
+    for orders in ([], [Order(OrderKind.STAY, 7, 0.0, 100.0)]):
+        flight = Flight(make_scenario, post_m=(0.0, -100.0))
+        flight.searcher._limits.change("sweeps", 1)
+        flight.fly(20)
+        for order in orders:
+            flight.searcher.on_message(ToldOrder(flight.now_ns // US, 21, 1, order), now_ns=flight.now_ns)
+        flight.fly(100)
+        modes.append(flight.modes[-1])
+    assert modes == ["done", "errand"]
+
+
 def test_who_flies_home_already_flies_on_once_it_knows_its_place_again(make_scenario: Callable[..., Scenario]) -> None:
     flight = Flight(make_scenario)
     flight.fly(40)

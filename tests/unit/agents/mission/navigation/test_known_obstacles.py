@@ -126,6 +126,7 @@ def test_an_area_that_is_forbidden_in_flight_is_flown_around_where_there_is_noth
     start, goal, obstacles = Enu(-100, 1, 60), Enu(100, 0, 60), KnownObstacles(NO_MAP)
     assert obstacles.way_to(start, goal, STILL, now_ns=0) is None
     obstacles.close(0.0, 0.0, 30.0)
+    assert obstacles.way_to(start, goal, STILL, now_ns=0) is not None, "it does not come up to the area first"
     places = flown(obstacles, start, goal, seconds=60)
     assert min(at.horizontal() for at in places) > 30
     assert places[-1].horizontal_to(goal) < 2

@@ -192,7 +192,7 @@ def _out_of_reach(scenario: Scenario) -> Iterator[str]:
         said = (
             f"radio.range_m = {range_m:g}"
             if radio.channel == "range"
-            else f"radio.channel = {radio.channel!r} reaches {range_m:.3g} m"
+            else f"radio.channel = {radio.channel!r} reaches {round(range_m, 1):g} m"
         )
         yield f"{said}: {len(alone)} of {count} nodes hear nobody where they start"
 

@@ -54,9 +54,10 @@ class _FaultInForce(NamedTuple):
 class Faults:
     """The faults in force by label, and the agenda of those that begin or end by themselves."""
 
-    def __init__(self, radio: Radio, *, stations: int, planned: Iterable[tuple[int, Control]] = ()) -> None:
+    def __init__(self, radio: Radio, *, stations: int, uavs: int, planned: Iterable[tuple[int, Control]] = ()) -> None:
+        """`uavs`: how many of the stations are UAVs, the first ones; what befalls UAVs befalls no others."""
         self._radio = radio
-        self._stations = stations
+        self._stations, self._uavs = stations, uavs
         self._standing: dict[str, _FaultInForce] = {}
         self._number = 0
         self._agenda: list[tuple[int, int, Control | None, str, int]] = []
@@ -89,7 +90,7 @@ class Faults:
             for label in [control.label] if control.label else list(self._standing):
                 self._end(label, now_ns)
             return None
-        why = wrong(control, count=self._stations)
+        why = wrong(control, count=self._uavs if isinstance(control, Mishap) else self._stations)
         if why is None and len(self._standing) >= MAX_FAULTS and control.label not in self._standing:
             why = "fault_limit"
         if why is None:
@@ -123,7 +124,7 @@ class Faults:
     # --- the effect on links and noise ----------------------------------------------------------------------------
 
     def apply(self, links: LinkTable, at: Reals) -> tuple[Reals, Reals]:
-        """Change links of stations at `at` [m, n x 3]; returns noise [mW] (inf: deaf) and jammers' energy at each."""
+        """Change links of stations at `at` [m, n x 3]; returns noise and jammers' energy [mW] at each."""
         noise, energy = np.full(self._stations, noise_mw(self._radio)), np.zeros(self._stations)
         faults = [item.fault for item in self._standing.values()]
         for fault in faults:

@@ -110,7 +110,7 @@ class Medium(Actor):
         self._close_ns = radio.lead_ns // 4
         self._rx_topics = [topics.radio_rx(node) for node in nodes]
         self._station_of = {topics.radio_tx(node): node - 1 for node in nodes}
-        faults = Faults(radio, stations=self._count, planned=scenario.planned_faults)
+        faults = Faults(radio, stations=self._count, uavs=scenario.nodes.count, planned=scenario.planned_faults)
         self._capture = capture
         self._kernel = KernelInterface(scenario, stations=self._count, faults=faults, capture=capture is not None)
         self._counters = MediumCounters(time_scale=scenario.time_scale)

@@ -29,9 +29,12 @@ def unused(path: Path) -> Path:
 
 
 def captures(path: Path) -> list[Path]:
-    """The captures that a finished run has left: `path`, and the same name with a number."""
-    named = sorted(path.parent.glob(f"{path.stem}*{path.suffix}"))
-    return [found for found in named if re.fullmatch(rf"{re.escape(path.stem)}(-\d+)?", found.stem)]
+    """The captures that a finished run has left, in the order of time: `path`, and the same name with a number."""
+    named = (
+        (re.fullmatch(rf"{re.escape(path.stem)}(?:-(\d+))?", found.stem), found)
+        for found in path.parent.glob(f"{path.stem}*{path.suffix}")
+    )
+    return [found for _, found in sorted((int(fits[1] or 1), found) for fits, found in named if fits)]
 
 
 class PcapFile:

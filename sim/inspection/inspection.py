@@ -9,7 +9,7 @@ from fanet_mw.bus.messages import Poses
 from fanet_mw.errors import MalformedFrameError
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record
-from fanet_mw.units import US
+from fanet_mw.units import US, S
 from fanet_mw.wire import node_of_system
 from sim.inspection.messages import Messages
 from sim.inspection.packets import Packets
@@ -76,6 +76,7 @@ class Inspection(Observer):
 def of_folder(folder: RunFolder) -> Inspection:
     """What the folder of a run holds; a log of MAVLink that is cut off there is counted as malformed."""
     found = Inspection(folder.scenario)
+    found.now_ns = round(folder.summary["simulated_s"] * S)
     epoch_ns = folder.summary.get("epoch_unix_ns", 0)
     try:
         for t_us, frame in tlog.read(folder.folder / TLOG_FILE):

@@ -41,6 +41,7 @@ from sim.observation.event_text import event_line
 from sim.observation.observer import Observer
 from sim.observation.turns import Turns, turns
 from sim.results.mission import CoveredCells, SurvivorStates
+from sim.results.packets import OTHER_APPS
 from sim.world.environment.survivors import place
 
 LATELY_NS: Final = 10 * S
@@ -75,6 +76,8 @@ class UavNow:
     cluster: int = -1
     head: int = 0
     charge_percent: int | None = None
+    posed_ns: int = 0
+    """The instant of its position."""
     heard_ns: int = 0
     """When its process was last heard of."""
     delivered: int = 0
@@ -113,14 +116,28 @@ class PacketNow:
     born_ns: int
     app: str = ""
     targets: int = 0
+    meant: frozenset[int] | None = None
+    """The nodes at which its copies count; None: all, as it is not known for whom it is meant."""
     bound_ns: int = 0
     excluded: set[int] = field(default_factory=set)
     """The nodes for which the bound does not hold, because the origin takes them to be gone."""
     got: dict[int, Copy] = field(default_factory=dict)
 
+    def copies(self) -> dict[int, Copy]:
+        """Its copies at nodes for which it is meant."""
+        if self.meant is None:
+            return self.got
+        return {node: copy for node, copy in self.got.items() if node in self.meant}
+
     def bounded_delays_ns(self) -> list[int]:
         """The delays of the copies for which the bound holds."""
-        return [copy.delay_ns for node, copy in self.got.items() if node not in self.excluded]
+        return [copy.delay_ns for node, copy in self.copies().items() if node not in self.excluded]
+
+    def broken(self) -> int:
+        """The copies that came later than the bound, or never, once it is over."""
+        delays = self.bounded_delays_ns()
+        wanted = len(delays) if self.meant is None else len(self.meant - self.excluded)
+        return wanted - sum(delay_ns <= self.bound_ns for delay_ns in delays)
 
 
 class Estimate(NamedTuple):
@@ -181,7 +198,7 @@ class SwarmState(Observer):
         self.broken = 0
         """Copies of packets that came later than the bound of their packet, or never."""
         self._app = next(iter(scenario.traffic_classes))
-        self._targets: dict[tuple[str, int], int] = {}
+        self._meant: dict[tuple[str, int], frozenset[int] | None] = {}
         self._links: deque[LinkStats] = deque()
         self._cells = CoveredCells(scenario)
         self._by_poses = False
@@ -268,6 +285,8 @@ class SwarmState(Observer):
         """Each directed link with traffic in the last seconds: source, destination, copies, received."""
         found: dict[tuple[int, int], list[int]] = {}
         for stats in self._links:
+            if stats.t_ns <= self.t_ns - _LINKS_NS:
+                continue
             for row in stats.rows():
                 sums = found.setdefault((row.src, row.dst), [0, 0])
                 sums[0] += row.copies
@@ -342,14 +361,13 @@ class SwarmState(Observer):
         """The figures of the swarm now; None for what is not known."""
         packets = self.lately()
         wanted = sum(one.targets for _, one in packets)
-        had = sum(min(one.targets, len(one.got)) for _, one in packets)
-        delays = sorted(copy.delay_ns for _, one in packets for copy in one.got.values())
+        delays = sorted(copy.delay_ns for _, one in packets for copy in one.copies().values())
         bounded = self.bounded()
         kept = sorted(delay_ns for one in bounded for delay_ns in one.bounded_delays_ns())
         air, late = self.emulator.get("air", {}), self.emulator.get("late", {})
         (since_ns, before_ns), (until_ns, after_ns) = (self._air[0], self._air[-1]) if self._air else ((0, 0), (0, 0))
         return {
-            "delivered_share": had / wanted if wanted else None,
+            "delivered_share": len(delays) / wanted if wanted else None,
             "delay_p50_ms": delays[len(delays) // 2] / MS if delays else None,
             "delay_p95_ms": delays[math.ceil(len(delays) * 0.95) - 1] / MS if delays else None,
             "delay_max_ms": delays[-1] / MS if delays else None,
@@ -381,12 +399,12 @@ class SwarmState(Observer):
     def _moved(self, node: int, position: Enu, velocity: Enu, t_ns: int) -> None:
         uav = self.uavs.get(node)
         if uav is None:
-            self.uavs[node] = uav = UavNow(position, velocity)
-        span_s = (t_ns - self.t_ns) / S
+            self.uavs[node] = uav = UavNow(position, velocity, posed_ns=t_ns)
+        span_s = (t_ns - uav.posed_ns) / S
         if 0 < span_s < 1:
             change = velocity.minus(uav.velocity)
             uav.acceleration = Enu(change.east / span_s, change.north / span_s, change.up / span_s)
-        uav.position, uav.velocity = position, velocity
+        uav.position, uav.velocity, uav.posed_ns = position, velocity, t_ns
         if velocity.horizontal() >= 0.5:
             uav.yaw_rad = math.atan2(velocity.east, velocity.north)
 
@@ -417,8 +435,7 @@ class SwarmState(Observer):
             if one.born_ns < self.t_ns - _REMEMBERED_NS:
                 del self.packets[name]
                 if one.bound_ns:
-                    in_time = sum(delay_ns <= one.bound_ns for delay_ns in one.bounded_delays_ns())
-                    self.broken += max(0, one.targets - len(one.excluded) - in_time)
+                    self.broken += one.broken()
 
     def _packet(self, origin: int, seq: int, born_ns: int) -> PacketNow:
         found = self.packets.get((origin, seq))
@@ -430,14 +447,18 @@ class SwarmState(Observer):
         one = self._packet(record.node, record.seq, record.t_ns)
         one.born_ns, one.app = record.t_ns, record.app
         key = (record.app, record.node)
-        if key not in self._targets:
-            known = record.app in self.scenario.traffic_classes
-            count = len(targets_of(self.scenario, record.node, record.app)) if known else self.scenario.nodes.count - 1
-            self._targets[key] = count
-        one.targets = self._targets[key]
+        if key not in self._meant:
+            self._meant[key] = self._meant_for(*key)
+        one.meant = self._meant[key]
+        one.targets = self.scenario.node_count - 1 if one.meant is None else len(one.meant)
         self._heard(record.node, record.t_ns)
         if record.node in self.uavs:
             self.uavs[record.node].sent += 1
+
+    def _meant_for(self, app: str, origin: int) -> frozenset[int] | None:
+        if app in self.scenario.traffic_classes:
+            return frozenset(targets_of(self.scenario, origin, app))
+        return frozenset(self.scenario.node_ids) - {origin} if app in OTHER_APPS else None
 
     def _delivered(self, record: Delivered) -> None:
         one = self._packet(record.origin, record.seq, record.t_ns - record.delay_ns)

@@ -9,11 +9,10 @@ from typing import Any, Final
 from matplotlib.axes import Axes
 from matplotlib.ticker import PercentFormatter
 
-from emulator.channel.link_budget import heard_m
 from emulator.pcap_reader import AirFrame, frames_of
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Posed
-from fanet_mw.units import MS, S
+from fanet_mw.units import MS, Enu, S
 from fanet_mw.wire import PRIORITIES
 from sim.figures.colors import BLUE, DARK, GRAY, GREEN, ORANGE, PINK, RED, SHADE
 from sim.figures.style import canvas, legend_above
@@ -22,6 +21,7 @@ from sim.report.html import Rows
 from sim.report.run_pictures import RunPicture
 from sim.report.run_records import RunRecords
 from sim.report.run_rows import number, percent
+from sim.world.environment.layout import positions
 
 _COLORS: Final = dict(zip(Cause, (BLUE, GREEN, RED, ORANGE, PINK, GRAY), strict=True))
 _WHY_COLORS: Final = (DARK, GRAY, SHADE)
@@ -165,14 +165,14 @@ def against_dominating_set(run: RunRecords, air: Air) -> str:
 
 
 def _dominating_sets(run: RunRecords) -> Iterator[set[int]]:
-    reach_m = heard_m(run.scenario.radio)
+    starts = dict(enumerate(positions(run.scenario), 1))
     begin_ns, end_ns = run.scenario.traffic_window_ns
     for step in range(_INSTANTS):
         at_ns = begin_ns + (end_ns - begin_ns) * step // _INSTANTS
-        moved = {node: _at(track, at_ns)[2:] for node, track in run.tracks.items()}
-        places: Mapping[int, tuple[float, ...]] = moved or run.places().at
+        moved = {node: Enu(*_at(track, at_ns)[2:]) for node, track in run.tracks.items()}
+        places = {**starts, **moved}
         yield greedy_dominating_set(
-            {a: {b for b, there in places.items() if b != a and math.dist(here, there) <= reach_m}
+            {a: {b for b, there in places.items() if b != a and math.dist(here, there) <= run.reach_m(a, b)}
              for a, here in places.items()}
         )  # fmt: skip
 

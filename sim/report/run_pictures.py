@@ -1,5 +1,6 @@
 """The pictures of one run's network: delays, delivery, and links over the area."""
 
+import math
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple
@@ -11,7 +12,6 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
-from emulator.channel.link_budget import heard_m
 from fanet_mw.trace import Delivered
 from fanet_mw.units import MS, S
 from sim.figures.colors import BLUE, DARK, GREEN, ORANGE, RED
@@ -52,7 +52,7 @@ def delays(run: RunRecords) -> RunPicture | None:
     if not run.delivered and not run.reports_delivered:
         return None
     figure, (axes,) = canvas(1, width=6.5)
-    others = run.scenario.nodes.count - 1
+    others = run.scenario.node_count - 1
     loads = [
         _Delays("load", run.sent, run.delivered, sum(len(run.targets(origin)) for origin, _ in run.sent), BLUE, RED),
         _Delays("reports", run.reports, run.reports_delivered, len(run.reports) * others, GREEN, ORANGE),
@@ -129,12 +129,11 @@ def links(run: RunRecords, counted: Sequence[Mapping[str, Any]]) -> RunPicture |
     known = [link for link in counted if link["copies"] and {link["src"], link["dst"]} <= places.at.keys()]
     if not known:
         return None
-    reach_m = heard_m(run.scenario.radio)
     ends = [(places.at[link["src"]], places.at[link["dst"]]) for link in known]
     shown = [
         index
-        for index, ((east, north), (east2, north2)) in enumerate(ends)
-        if not places.moved or (east - east2) ** 2 + (north - north2) ** 2 <= reach_m**2
+        for index, (link, (here, there)) in enumerate(zip(known, ends, strict=True))
+        if not places.moved or math.dist(here, there) <= run.reach_m(link["src"], link["dst"])
     ]
     figure, axes = map_canvas(list(places.at.values()))
     lines = LineCollection([ends[index] for index in shown], cmap=_SHARES, linewidths=1.3)
@@ -153,9 +152,13 @@ def links(run: RunRecords, counted: Sequence[Mapping[str, Any]]) -> RunPicture |
     )
     caption = f"Links by the share of copies received in the whole run; nodes {places.said}."
     if places.moved:
+        post, uav = run.scenario.post, run.scenario.uav_ids[0]
+        reach_m, of_post_m = run.reach_m(uav, uav), run.reach_m(uav, post or uav)
+        farther = f" ({of_post_m:.0f} m from the post)" if of_post_m > reach_m else ""
         caption += (
-            f" Drawn are the {len(shown):,} directed links between nodes that were within {reach_m:.0f} m of each "
-            f"other there, the radio's reach; {len(known) - len(shown):,} other pairs were in range at other times."
+            f" Drawn are the {len(shown):,} directed links between nodes that were within {reach_m:.0f} m{farther} of "
+            "each other there, the radio's reach; "
+            f"{len(known) - len(shown):,} other pairs were in range at other times."
         )
     return RunPicture(figure, caption)
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
 from agents.applications.traffic import targets_of
+from emulator.channel.link_budget import heard_m
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.trace import (
@@ -39,7 +40,7 @@ _WINDOW_NS: Final = 10 * S
 
 
 class PlacesOnMap(NamedTuple):
-    """The places of the UAVs on the map of the links, by node id."""
+    """The places of the nodes on the map of the links, by id."""
 
     at: Mapping[int, tuple[float, float]]
     said: str
@@ -54,7 +55,7 @@ class RunRecords:
 
     scenario: Scenario
     sent: dict[tuple[int, int], int] = field(default_factory=dict)
-    """The instant at which each packet of the load was generated."""
+    """The instant at which each packet of the first load was generated."""
     bounds: dict[tuple[int, int], int] = field(default_factory=dict)
     delivered: list[Delivered] = field(default_factory=list)
     reports: dict[tuple[int, int], int] = field(default_factory=dict)
@@ -77,11 +78,12 @@ class RunRecords:
     def read(self, records: Iterable[Record]) -> None:
         """Take in all records of these kinds; to be called once."""
         had: set[tuple[int, int, int]] = set()
+        load = next(iter(self.scenario.traffic_classes))
         for record in records:
             match record:
                 case Posed():
                     self.tracks[record.node].append(record)
-                case Generated() if record.app == "traffic":
+                case Generated() if record.app == load:
                     self.sent[record.node, record.seq] = record.t_ns
                 case Generated() if record.app == "report":
                     self.reports[record.node, record.seq] = record.t_ns
@@ -126,6 +128,11 @@ class RunRecords:
         """The positions of all UAVs, in no order of time [m]."""
         return ((one.east_m, one.north_m, one.up_m) for track in self.tracks.values() for one in track)
 
+    def reach_m(self, a: int, b: int) -> float:
+        """How far the radio of one node is heard by that of another; the antenna of the post may have a gain."""
+        scenario = self.scenario
+        return heard_m(scenario.radio, gain_dbi=scenario.ground.gain_dbi if scenario.post in (a, b) else 0.0)
+
     @property
     def searches(self) -> bool:
         """True if the run has a mission: people to be found, or an area to be searched."""
@@ -138,7 +145,9 @@ class RunRecords:
         return last_ns / S if last_ns else self.scenario.duration_s
 
     def places(self) -> PlacesOnMap:
-        """The mean place of each UAV in the last seconds of the load, or where it was placed if nobody flew."""
+        """The mean place of each UAV in the last seconds of the load, or where it was placed if nobody flew; and that
+        of the post.
+        """
         starts = {node: (at.east, at.north) for node, at in enumerate(positions(self.scenario), 1)}
         if not any(_length(track) > 1.0 for track in self.tracks.values()):
             return PlacesOnMap(starts, "where they stood during the whole run", moved=False)
@@ -150,6 +159,7 @@ class RunRecords:
             for node, seen in within.items()
             if seen
         }
+        mean |= {post: starts[post] for post in [self.scenario.post] if post is not None}
         return PlacesOnMap(mean, f"at their mean places from {start_ns / S:g} to {end_ns / S:g} s", moved=True)
 
 

@@ -174,7 +174,7 @@ def _scatter(
 def _node_axis(axes: Axes, run: RunRecords) -> None:
     axes.set_ylabel("origin (node id)")
     axes.yaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.set_ylim(0.2, run.scenario.nodes.count + 0.8)
+    axes.set_ylim(0.2, run.scenario.node_count + 0.8)
 
 
 def _frame_axes(axes: Axes, period_ns: int, called: str) -> None:

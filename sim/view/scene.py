@@ -114,7 +114,7 @@ class Scene:
         if self._packet is None:
             return 0, 0
         own_ns = self._own_time_ns(t_ns)
-        return sum(copy.delay_ns <= own_ns for copy in self._packet[1].got.values()), own_ns
+        return sum(copy.delay_ns <= own_ns for copy in self._packet[1].copies().values()), own_ns
 
     def turn_ns(self, t_ns: int) -> int:
         """The instant whose turn is shown: where turns are too short to be seen, that of the packet which spreads."""

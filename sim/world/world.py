@@ -12,7 +12,7 @@ import numpy as np
 
 from fanet_mw.actor import Actor
 from fanet_mw.bus.messages import Message, Poses, Setpoint
-from fanet_mw.bus.radio_control import Control, Cut, MishapKind
+from fanet_mw.bus.radio_control import Control, Cut, MishapKind, Restore
 from fanet_mw.bus.topics import Topics, node_of
 from fanet_mw.rng import stream_seed
 from fanet_mw.scenario import Scenario
@@ -113,6 +113,11 @@ def _sight(scenario: Scenario, solids: Solids) -> "Sight":
     return Sight(scenario, solids)
 
 
+def _crash_label(node: int) -> str:
+    """The label of the fault by which a crash ends a radio."""
+    return f"crash-{node}"
+
+
 class WorldActor(Actor):
     """The bodies, survivors and sensors of one swarm."""
 
@@ -128,7 +133,7 @@ class WorldActor(Actor):
         starts, self._on_ground = np.split(places, [len(self._ids)])
         solid = obstacles(scenario, places) if scenario.world.has_obstacles else None
         solids = Solids(solid)
-        self._surface_m = solids.surface_m
+        self._surface_m, self._gap_m = solids.surface_m, solids.gap_m
         self._engine = make_engine(scenario, solid)
         if flight is None:
             self._engine.reset(starts)
@@ -152,6 +157,8 @@ class WorldActor(Actor):
         self._flies = np.ones(len(self._ids), bool)
         self._falling: set[int] = set()
         """The UAVs that fall by a fault, and whose sensors and radio work until they hit something."""
+        self._radio_died: set[int] = set()
+        """The UAVs whose radio a crash has ended, for good."""
         if flight is not None and scenario.world.crash == "falls":
             self._find_wrecks(solids)
         self._ticks = Ticks()
@@ -170,6 +177,10 @@ class WorldActor(Actor):
         if topic == self._topics.radio_control:
             if isinstance(message, Control):
                 self._mishaps.add(message, now_ns)
+            if isinstance(message, Restore):
+                for node in sorted(self._radio_died):
+                    if message.label in ("", _crash_label(node)):
+                        self._cut(node)
             return
         node = node_of(topic)
         if not isinstance(message, Setpoint) or not 1 <= node <= len(self._ids) or not makes_sense(message):
@@ -226,8 +237,10 @@ class WorldActor(Actor):
     def _suffer(self, now_ns: int) -> None:
         for mishap in self._mishaps.due(now_ns):
             if mishap.what is MishapKind.CRASH and self._flies[mishap.node - 1]:
-                self._falling.add(mishap.node)
-                self._crash(mishap.node, radio_dies=False)
+                lies = float(self._gap_m(self._engine.positions()[[mishap.node - 1]])[0]) <= _WRECK_M
+                if not lies:
+                    self._falling.add(mishap.node)
+                self._crash(mishap.node, radio_dies=lies)
             elif mishap.what is MishapKind.BATTERY and self._drain is not None:
                 charge = self._drain.batteries.charge
                 charge[mishap.node - 1] = min(charge[mishap.node - 1], mishap.value.east)
@@ -321,7 +334,8 @@ class WorldActor(Actor):
             self._cut(node)
 
     def _cut(self, node: int) -> None:
-        self.outbox.append((self._topics.radio_control, Cut(f"crash-{node}", NodeId(node))))
+        self._radio_died.add(node)
+        self.outbox.append((self._topics.radio_control, Cut(_crash_label(node), NodeId(node))))
 
     def _publish(self, now_ns: int, before_ns: int) -> None:
         """Publish the poses, and the readings of sensors that have an instant in (before, now]."""

@@ -64,7 +64,7 @@ class RunningTally(Observer):
         self._traffic = next(iter(scenario.traffic_classes))
         lifetime_ns = scenario.routing.lifetime_ns(PRIORITY_BULK)
         self._ripe_ns = min(lifetime_ns, scenario.duration_ns // _RIPE_SHARE)
-        self._targets = {node: len(targets_of(scenario, node)) for node in scenario.node_ids}
+        self._targets = {node: frozenset(targets_of(scenario, node)) for node in scenario.node_ids}
         self._sent: dict[tuple[int, int], int] = {}
         """The instant of each packet that is not ripe, by origin and number."""
         self._copies: deque[Counter[tuple[int, int]]] = deque([Counter()], maxlen=_PARTS + 2)
@@ -82,7 +82,8 @@ class RunningTally(Observer):
         for record in records:
             match record:
                 case Delivered():
-                    self._copies[-1][record.origin, record.seq] += 1
+                    if record.node in self._targets.get(record.origin, ()):
+                        self._copies[-1][record.origin, record.seq] += 1
                     self._latest_ns = max(self._latest_ns, record.t_ns)
                 case Generated(app=self._traffic):
                     self._sent[record.node, record.seq] = record.t_ns
@@ -101,7 +102,7 @@ class RunningTally(Observer):
             return
         for key in [key for key, t_ns in self._sent.items() if t_ns <= self._latest_ns - self._ripe_ns]:
             del self._sent[key]
-            wanted = self._targets[key[0]]
+            wanted = len(self._targets[key[0]])
             self._wanted += wanted
             self._delivered += min(wanted, sum(copies[key] for copies in self._copies))
         self._copies.append(Counter())

@@ -19,7 +19,7 @@ from test_medium_timelines import ACK_NS, DIFS_NS, FRAME_NS, PAYLOAD, SIFS_NS, A
 
 from emulator.medium import Medium
 from emulator.pcap import Pcap, checksum
-from emulator.pcap_file import PcapFile, unused
+from emulator.pcap_file import PcapFile, captures, unused
 from emulator.pcap_reader import AirFrame, frames_of
 from fanet_mw import mavlink, wire
 from fanet_mw.bus.messages import Reception
@@ -334,6 +334,9 @@ def test_an_emulator_that_starts_again_keeps_the_capture_of_the_last_one(tmp_pat
         path = unused(tmp_path / "air.pcap")
         assert path.name == name
         path.touch()
+    (tmp_path / "air-10.pcap").touch()
+    names = [path.name for path in captures(tmp_path / "air.pcap")]
+    assert names == ["air.pcap", "air-2.pcap", "air-3.pcap", "air-10.pcap"], "in the order in which they were made"
 
 
 @pytest.mark.skipif(shutil.which("tshark") is None, reason="tshark is not installed")

@@ -12,11 +12,11 @@ from test_medium_timelines import ACK_NS, FRAME_NS, NAMES, PAYLOAD, SIFS_NS, Air
 from emulator import faults
 from emulator.kernel.state import LINK_DST, LINK_SRC, SPARED
 from fanet_mw.bus.messages import Poses, Reception, TxOutcome, TxRequest
-from fanet_mw.bus.radio_control import Control, Cut, Degrade, Jam, Partition, Restore
+from fanet_mw.bus.radio_control import Control, Cut, Degrade, Jam, Mishap, MishapKind, Partition, Restore
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario, config
 from fanet_mw.trace import RadioFault, line, parse
-from fanet_mw.units import BROADCAST, MS, US, Enu, NodeId, S
+from fanet_mw.units import BROADCAST, MS, STILL, US, Enu, NodeId, S
 
 MakeScenario = Callable[..., Scenario]
 
@@ -462,8 +462,15 @@ def test_a_jammer_jams_who_is_within_its_radius_to_all_sides(
     assert {node for node, *_ in receptions(air.run())} == {2, 3, 4, 5} - deaf
 
 
+def test_what_befalls_uavs_does_not_befall_the_post(make_scenario: MakeScenario) -> None:
+    air = Air(make_scenario(**{"nodes.count": 2, "ground.at_m": [0, 0]}), [0, 100, 200])
+    control(air, Mishap("node-3", NodeId(3), MishapKind.CRASH, STILL))
+    assert air.medium.report()["refused"] == {"fault_unknown_node": 1}
+    assert not air.medium.records
+
+
 def test_a_fault_ends_at_its_instant_however_late_that_is_noticed() -> None:
-    known = faults.Faults(config.build({}).radio, stations=3, planned=[(2 * MS, cut(2, for_ns=5 * MS))])
+    known = faults.Faults(config.build({}).radio, stations=3, uavs=3, planned=[(2 * MS, cut(2, for_ns=5 * MS))])
     known.pass_time(90 * MS)
     assert [(record.t_ns, record.active) for record in known.records] == [(2 * MS, True), (7 * MS, False)]
 

@@ -4,9 +4,11 @@ import pytest
 from kit import MakeScenario
 
 from emulator.pcap_reader import AirFrame
-from fanet_mw.units import BROADCAST
+from fanet_mw.trace import Generated, Posed
+from fanet_mw.units import BROADCAST, S
 from fanet_mw.wire import FLAG_FLOOD, PRIORITY_BULK, PRIORITY_SAFETY, Header, Kind, filler
-from sim.report.air_pictures import Air, Cause, greedy_dominating_set, losses, rows
+from sim.report.air_pictures import Air, Cause, against_dominating_set, greedy_dominating_set, losses, rows
+from sim.report.run_records import RunRecords
 
 
 def frame(
@@ -66,3 +68,17 @@ def test_what_was_lost_is_told_with_its_reason() -> None:
 )
 def test_a_greedy_set_reaches_everyone_of_the_greatest_part(links: dict[int, set[int]], size: int) -> None:
     assert len(greedy_dominating_set(links)) == size
+
+
+def test_the_post_is_among_the_nodes_that_a_flood_must_reach(make_scenario: MakeScenario) -> None:
+    """Three UAVs in a line 100 m apart, and 120 m from the last one the post, whose antenna has a gain."""
+
+    def said(gain_dbi: float) -> str:
+        post = {"ground.at_m": [220, 0], "ground.antenna_m": 1, "ground.gain_dbi": gain_dbi}
+        run = RunRecords(make_scenario(**{"nodes.count": 3, "radio.range_m": 110, **post}))
+        flown = [Posed(second * S, node, 100.0 * (node - 2), 0.0, 1.0) for second in range(10) for node in (1, 2, 3)]
+        run.read([*flown, Generated(S, 1, 7, "traffic", 40)])
+        return against_dominating_set(run, Air(run.scenario, [frame(1, 1, 7), frame(2, 1, 7), frame(3, 1, 7)]))
+
+    assert "has 2 nodes (mean of 12 instants): 1.50 times" in said(4.0)
+    assert "has 1 nodes" in said(0.0)

@@ -256,3 +256,44 @@ def test_bounds_are_kept_of_those_that_were_stated() -> None:
         ("of these, later than their bound or never; the rest had time left when the run ended", "2"),
         ("late or lost likewise, because a fault overtook them", "5"),
     ]
+
+
+GROUND = {"ground.at_m": [-70, 0], "ground.gain_dbi": 20.0}
+
+
+def test_the_post_and_the_reach_of_its_antenna_are_on_the_map_of_a_swarm_that_flies(
+    make_scenario: MakeScenario,
+) -> None:
+    scenario = make_scenario(**SEARCH, **GROUND, **{"drain_s": 4, "radio.range_m": 50})
+    links = [{"src": src, "dst": dst, "copies": 4, "received": 3} for src, dst in ((1, 2), (2, 3), (3, 2))]
+    drawing = run_pictures.links(run_of(scenario, *FOUND), links)
+    assert drawing is not None
+    (nodes,) = (one for one in drawing.figure.axes[0].collections if one.get_label() == "node")
+    assert np.asarray(nodes.get_offsets()).tolist() == [[-70, 40], [-70, 80], [-70, 0]]
+    assert "Drawn are the 3 directed links between nodes that were within 50 m (500 m from the post)" in drawing.caption
+    assert "0 other pairs" in drawing.caption
+
+
+def test_the_post_has_its_line_among_the_turns(make_scenario: MakeScenario) -> None:
+    scenario = make_scenario(**{"nodes.count": 3, "routing.protocol": "rounds", **GROUND})
+    drawing = slot_pictures.slots(run_of(scenario, LetOut(S, 4, 1)), {})
+    assert drawing is not None
+    assert drawing.figure.axes[0].get_ylim()[1] > 4
+
+
+def test_a_report_to_all_is_for_the_post_too(make_scenario: MakeScenario) -> None:
+    records = [
+        Generated(S, 1, 1, "report", 50),
+        *(Delivered(S + node * MS, node, 1, 1, node * MS, 1) for node in (2, 3)),
+    ]
+    drawing = run_pictures.delays(run_of(make_scenario(**{"nodes.count": 2, "duration_s": 20, **GROUND}), *records))
+    assert drawing is not None
+    assert drawing.figure.axes[0].lines[0].get_ydata().tolist() == [0.5, 1.0]  # type: ignore[union-attr]
+
+
+def test_the_first_load_is_drawn_whatever_its_name(make_scenario: MakeScenario) -> None:
+    scenario = make_scenario(**{"nodes.count": 2, "duration_s": 20, "traffic.name": "video"})
+    records = [Generated(S, 1, 1, "video", 100), Delivered(2 * S, 2, 1, 1, S, 1)]
+    drawing = run_pictures.delays(run_of(scenario, *records))
+    assert drawing is not None
+    assert run_pictures.delivery(run_of(scenario, *records)) is not None

@@ -152,6 +152,10 @@ def test_the_messages_of_a_folder_have_instants_of_the_swarm(folder: Path) -> No
     assert since == first_us * US - run.summary["epoch_unix_ns"] > 0
 
 
+def test_a_folder_is_looked_at_as_of_the_end_of_its_run(folder: Path) -> None:
+    assert of_folder(RunFolder(folder)).now_ns == 6 * S
+
+
 async def test_the_screens_show_a_recording(folder: Path) -> None:
     inspection = of_folder(RunFolder(folder))
     app = Inspector(inspection, title="a run", pump=lambda _: "nothing skipped", live=False)

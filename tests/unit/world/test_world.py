@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fanet_mw.bus.messages import Gps, Poses, Setpoint, WifiScan
-from fanet_mw.bus.radio_control import Mishap, MishapKind
+from fanet_mw.bus.radio_control import Cut, Mishap, MishapKind, Restore
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
@@ -177,3 +177,25 @@ def test_poses_name_every_node_and_come_before_anyone_transmits(make_scenario: M
     (poses, *_) = [message for _, _, message in advance(world(make_scenario), 0) if isinstance(message, Poses)]
     assert poses.ids == array("H", [1, 2, 3, 4])
     assert poses.t_ns == 0
+
+
+def said_to_be_cut(found: list[tuple[int, str, Any]]) -> list[tuple[float, str]]:
+    return [(t_ns / S, message.label) for t_ns, _, message in found if isinstance(message, Cut)]
+
+
+def test_the_radio_of_a_uav_that_crashes_on_the_ground_dies_at_once(make_scenario: MakeScenario) -> None:
+    made = world(make_scenario, **{"nodes.on_ground": True})
+    steer(made, 1, Enu(0.0, 0.0, 20.0))
+    advance(made, 2 * S)
+    made.receive(NAMES.radio_control, Mishap("node-2", NodeId(2), MishapKind.CRASH, STILL), 2 * S)
+    assert said_to_be_cut(advance(made, 6 * S)) == [(2.1, "crash-2")]
+
+
+def test_the_end_of_all_faults_gives_nobody_back_a_radio_that_died(make_scenario: MakeScenario) -> None:
+    made = world(make_scenario, **{"nodes.altitude_m": 5})
+    made.receive(NAMES.radio_control, Mishap("node-2", NodeId(2), MishapKind.CRASH, STILL), 0)
+    assert [label for _, label in said_to_be_cut(advance(made, 4 * S))] == ["crash-2"]
+    for label, again in (("", ["crash-2"]), ("jam", []), ("crash-2", ["crash-2"]), ("", ["crash-2"])):
+        made.receive(NAMES.radio_control, Restore(label), 4 * S)
+        assert [message.label for _, message in made.outbox if isinstance(message, Cut)] == again
+        made.outbox.clear()

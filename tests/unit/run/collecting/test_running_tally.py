@@ -95,3 +95,10 @@ def test_a_run_that_is_watched_never_confirms_more_survivors_than_there_are(make
     found.take_records([Confirmed(2 * S, node, person_id(node, 1), 300.0, 5.0) for node in (1, 2)])
     assert found.confirmed == {1}
     assert found.without_phone == {3}
+
+
+def test_copies_count_at_the_targets_alone(make_scenario: MakeScenario) -> None:
+    found = RunningTally(make_scenario(**{"nodes.count": 4, "duration_s": 20, "traffic.targets": [4]}))
+    for second in range(10):
+        send(found, second, at_s=second, arrives=2)
+    assert found.delivered_share() == 0.0, "node 4 got none"

@@ -124,7 +124,7 @@ def test_a_hill_does_not_raise_antennas_above_the_ground_they_stand_on(make_scen
                                 "radio.sensitivity_dbm": -90.0})  # fmt: skip
 
     def power_mw(hill_m: float) -> float:
-        kernel = KernelInterface(scenario, stations=2, faults=Faults(scenario.radio, stations=2, planned=()))
+        kernel = KernelInterface(scenario, stations=2, faults=Faults(scenario.radio, stations=2, uavs=2))
         none = np.zeros((0, 2), np.int64), np.zeros(0)
         kernel.obstruct(*none, np.full(2, hill_m))
         kernel.place(np.array([[0.0, 0, hill_m + 2], [1000, 0, hill_m + 2]]), np.zeros((2, 3)), 0)

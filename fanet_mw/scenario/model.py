@@ -10,8 +10,9 @@ from typing import Annotated, Any, Final, Self
 
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from fanet_mw.bus.radio_control import Control, Mishap, MishapKind
+from fanet_mw.bus.radio_control import Control
 from fanet_mw.scenario.cross_checks import disagreements
+from fanet_mw.scenario.stops import stops_of
 from fanet_mw.scenario.tables.clock import Clock
 from fanet_mw.scenario.tables.clusters import Clusters
 from fanet_mw.scenario.tables.faults import AnyFault
@@ -160,11 +161,7 @@ class Scenario(Section):
 
     def planned_stops(self, node: int) -> list[tuple[int, int | None]]:
         """When the program of a node ends [ns], and when it is started again; None if it is not."""
-        return sorted(
-            (at_ns, at_ns + control.for_ns if control.for_ns else None)
-            for at_ns, control in self.planned_faults
-            if isinstance(control, Mishap) and control.what is MishapKind.STOP and control.node == node
-        )
+        return stops_of(self.planned_faults, node)
 
     @property
     def post(self) -> NodeId | None:

@@ -1,7 +1,7 @@
 """Everything that an inspector shows of a swarm: an observer that keeps what it is told, bounded."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from fanet_mw import tlog
 from fanet_mw.bus.link_stats import LOSSES, LinkStats
@@ -17,6 +17,9 @@ from sim.observation.observer import Observer
 from sim.observation.turns import Turns, turns
 from sim.results.file_names import TLOG_FILE
 from sim.results.run_folder import RunFolder
+
+_LINKS_LAST_NS: Final = 2 * S
+"""What links carried is told each second in which they carry anything."""
 
 
 class LinkLine(NamedTuple):
@@ -42,11 +45,15 @@ class Inspection(Observer):
         self.packets = Packets()
         self.links: Sequence[LinkLine] = ()
         """What links carried lately, or in the whole run of a recording, the busiest first."""
+        self._links_ns = 0
+        """When that was told last."""
         self.now_ns = 0
         self._reports: dict[int, Mapping[str, Any]] = {}
 
     def take_poses(self, poses: Poses) -> None:
         self.now_ns = max(self.now_ns, poses.t_ns)
+        if poses.t_ns > self._links_ns + _LINKS_LAST_NS:
+            self.links = ()
 
     def take_records(self, records: Iterable[Record]) -> None:
         self.packets.take(records)
@@ -56,7 +63,7 @@ class Inspection(Observer):
             LinkLine(row.src, row.dst, row.copies, row.received, row.rssi_dbm, dict(zip(LOSSES, row.lost, strict=True)))
             for row in stats.rows()
         ]
-        self.links = sorted(lines, key=LinkLine.order)
+        self.links, self._links_ns = sorted(lines, key=LinkLine.order), stats.t_ns
 
     def take_report(self, name: str, content: Mapping[str, Any], *, t_ns: int) -> None:
         if name.startswith("agent-"):

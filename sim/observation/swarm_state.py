@@ -58,7 +58,8 @@ _TRAIL: Final = 60
 """The number of places of a trail, one a second."""
 _BATTERY_ID: Final = 1
 """SYS_STATUS of MAVLink, whose byte 30 is the charge in percent, -1: unknown."""
-_BATTERY_AT: Final = 10 + 30
+_HEADER_BYTES: Final = 10
+_BATTERY_AT: Final = 30
 _ACK_ID: Final = int(common.MAVLINK_MSG_ID_COMMAND_ACK)
 
 
@@ -271,9 +272,8 @@ class SwarmState(Observer):
                     self._said(self.uavs[node], kind, t_ns)
                 if kind == FOUND.msgid:
                     self._found(Found.decode_frame(Content(((kind, frame),))), t_ns)
-                elif kind == _BATTERY_ID and len(frame) > _BATTERY_AT + 2 and node in self.uavs:
-                    percent = int.from_bytes(frame[_BATTERY_AT : _BATTERY_AT + 1], "little", signed=True)
-                    self.uavs[node].charge_percent = percent if percent >= 0 else None
+                elif kind == _BATTERY_ID and node in self.uavs:
+                    self.uavs[node].charge_percent = _charge_percent(frame)
                 elif kind == _ACK_ID and (refusal := _refusal(frame)):
                     self._tell(Event(t_ns, node, f"UAV {node} {refusal}"))
         except MalformedFrameError:
@@ -539,6 +539,13 @@ class SwarmState(Observer):
             min(found.t_us * 1000, t_ns), found.survivor, found.node, found.east_m, found.north_m, found.sigma_m,
             found.standing.name.lower(),
         )  # fmt: skip
+
+
+def _charge_percent(frame: bytes) -> int | None:
+    """The charge in a SYS_STATUS; zeros at the end of a message are not sent (MAVLink 2, payload truncation)."""
+    payload = frame[_HEADER_BYTES : _HEADER_BYTES + frame[1]]
+    percent = int.from_bytes(payload[_BATTERY_AT : _BATTERY_AT + 1], "little", signed=True)
+    return percent if percent >= 0 else None
 
 
 def _refusal(frame: bytes) -> str:

@@ -182,7 +182,8 @@ def _recorded(folder: Path, epoch_ns: int, scenario: Scenario) -> tuple[list[Lin
             if isinstance(error, ConfigError):
                 raise
             raise ConfigError(f"{path}: cannot be read: {str(error)[:200]}") from error
-    return links, told
+    once = {stats.t_ns: stats for stats in links}, {one[:2]: one for one in told}  # two may have recorded the run
+    return [once[0][t_ns] for t_ns in sorted(once[0])], [once[1][name] for name in sorted(once[1])]
 
 
 def _content(text: str, *, source: str) -> Mapping[str, Any]:

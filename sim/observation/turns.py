@@ -57,7 +57,10 @@ def turns(scenario: Scenario, reports: Mapping[int, Mapping[str, Any]]) -> Turns
     turned = {node: report["turns"] for node, report in reports.items() if report.get("turns")}
     if turned:
         newest = max(turned.values(), key=lambda frame: float(frame["start_ms"]))
-        own = sorted((one for node, frame in turned.items() for one in spans_of(node, frame)), key=lambda one: one[1:])
+        in_force = {node: frame for node, frame in turned.items() if _geometry(frame) == _geometry(newest)}
+        own = sorted(
+            (one for node, frame in in_force.items() for one in spans_of(node, frame)), key=lambda one: one[1:]
+        )
         contention_ns = _ns(newest.get("contention_ms", 0.0))
         windows = [(0, contention_ns)] if contention_ns else []
         return Turns(_ns(newest["start_ms"]), _ns(newest["period_ms"]), own, "turn", windows)
@@ -70,6 +73,12 @@ def turns(scenario: Scenario, reports: Mapping[int, Mapping[str, Any]]) -> Turns
         return None
     own = [Span(slot, slot * slot_ns, slot_ns - _ns(frame["guard_ms"])) for slot in range(period_ns // slot_ns)]
     return Turns(_ns(frame["start_ms"]), period_ns, own, "slot")
+
+
+def _geometry(frame: Mapping[str, Any]) -> tuple[int, ...]:
+    """What tells a timetable from an older one, which who hears nothing any more goes on to report."""
+    period_ns = _ns(frame["period_ms"])
+    return _ns(frame["start_ms"]) % period_ns, period_ns, _ns(frame["turn_ms"]), _ns(frame.get("contention_ms", 0.0))
 
 
 def spans_of(node: int, frame: Mapping[str, Any]) -> Iterator[Span]:

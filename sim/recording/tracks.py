@@ -1,14 +1,17 @@
 """The tracks of UAVs and the finds of survivors for maps: GPX 1.1, a file per UAV, and KML 2.2, one file for all.
 
-Places are WGS84 about the scenario's origin, heights those above it; instants are unix time, in UTC.
+Places are WGS84 about the scenario's origin; heights are those of the world, in KML above the ground below; instants
+are unix time, in UTC.
 """
 
 from collections import defaultdict
+from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 from xml.etree import ElementTree as Xml
 
+from fanet_mw.errors import ConfigError
 from fanet_mw.geodesy import Geodetic, to_geodetic
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Confirmed, PlacedAmong, PlacedInside, Posed
@@ -16,6 +19,7 @@ from fanet_mw.units import Enu, S
 from fanet_mw.whole_file import replacing, writing
 from sim.records.record_kinds import records_of
 from sim.results.outcome import Outcome
+from sim.world.environment.obstacles import terrain
 
 _GPX: Final = "http://www.topografix.com/GPX/1/1"
 _KML: Final = "http://www.opengis.net/kml/2.2"
@@ -63,17 +67,27 @@ def write_kml(outcome: Outcome, path: Path) -> int:
         _text(mark, "description", f"by UAV {record.node} at {record.t_ns / S:.1f} s")
         _text(Xml.SubElement(mark, "TimeStamp"), "when", _instant(outcome, record.t_ns))
         _text(Xml.SubElement(mark, "Point"), "coordinates", _coordinate(scenario, record.east_m, record.north_m))
-    count = 0
+    count, ground_m = 0, _ground(scenario)
     for node, track in sorted(_tracks(outcome).items()):
         flown = Xml.SubElement(_placemark(document, f"UAV {node}"), "gx:Track")
         _text(flown, "altitudeMode", "relativeToGround")
         for one in track:
             _text(flown, "when", _instant(outcome, one.t_ns))
         for one in track:
-            _text(flown, "gx:coord", _coordinate(scenario, one.east_m, one.north_m, one.up_m).replace(",", " "))
+            above_m = one.up_m - ground_m(one.east_m, one.north_m)
+            _text(flown, "gx:coord", _coordinate(scenario, one.east_m, one.north_m, above_m).replace(",", " "))
         count += len(track)
     _write(root, path)
     return count
+
+
+def _ground(scenario: Scenario) -> Callable[[float, float], float]:
+    """The height of the ground at a place; that of flat ground if the map is gone."""
+    try:
+        hills = terrain(scenario)
+    except ConfigError:
+        hills = None
+    return (lambda _east_m, _north_m: 0.0) if hills is None else hills.height_m
 
 
 def _tracks(outcome: Outcome) -> dict[int, list[Posed]]:

@@ -57,7 +57,9 @@ def progress(run: RunRecords) -> RunPicture | None:
 
 def _progress_said(run: RunRecords, drawn: Sequence[str], *, covered: bool) -> str:
     said = [f"Number of different survivors {', '.join(drawn)} so far."] if drawn else []
-    possible = ["detected", "approached", "reached"] + ["confirmed"] * (run.scenario.mission.search != "none")
+    possible = ["detected", "approached", "reached"]
+    if run.scenario.mission.search != "none" and not run.unplaced:
+        possible.append("confirmed")
     missing = [label for label in possible if label not in drawn]
     if run.scenario.mission.survivors and missing:
         said.append(f"No survivor was {' or '.join(missing)}.")
@@ -96,7 +98,9 @@ def _draw_counts(axes: Axes, lines: Sequence[tuple[str, list[Step], str, str, st
 
 
 def waits(run: RunRecords) -> RunPicture | None:
-    """How long each survivor waited: from heard to found, and until the post on the ground knew."""
+    """How long each survivor waited: from heard to found, and until the post on the ground knew; None where the places
+    are not known, and so who was found.
+    """
     heard: dict[int, int] = {}
     known: dict[int, list[int]] = {}
     held = Confirmations(run.survivors)
@@ -106,7 +110,7 @@ def waits(run: RunRecords) -> RunPicture | None:
             heard.setdefault(record.survivor, record.t_ns)
         elif isinstance(record, KnownOnGround):
             known.setdefault(record.survivor, []).append(record.t_ns)
-    if not heard or run.scenario.mission.search == "none":
+    if not heard or run.scenario.mission.search == "none" or run.unplaced:
         return None
     confirmed = {one.survivor: one.t_ns for one in held.right()}
     rows = sorted(heard, key=lambda one: (heard[one], one))

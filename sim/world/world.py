@@ -202,6 +202,8 @@ class WorldActor(Actor):
         self._suffer(due_ns)
         if not self._guidance.still or self._falling:
             self._move(before_ns, due_ns)
+        else:
+            self._record_modes(due_ns)
         self._ticks.last_ns = due_ns
         self._publish(due_ns, before_ns)
         self._ticks.follow(due_ns, now_ns, period_ns=self._period_ns)

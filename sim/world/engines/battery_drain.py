@@ -72,13 +72,12 @@ class BatteryDrain:
         self._table = power_table(self._vehicle)
 
     def pass_time(self, seconds: float, engine: Engine, flies: Flags) -> list[int]:
-        """Drain the batteries; returns the rows whose battery has become empty."""
+        """Drain the batteries; returns the rows whose battery is empty."""
         power = engine.power_w()
         if power is None:
             power = self._steady_w(engine.velocities())
-        before = self.batteries.empty
         self.batteries.drain(np.where(flies, power, self._vehicle.avionics_w), seconds)
-        return np.flatnonzero(self.batteries.empty & ~before).tolist()
+        return np.flatnonzero(self.batteries.empty).tolist()
 
     def _steady_w(self, velocity: Values) -> Values:
         speed = np.minimum(np.linalg.norm(velocity[:, :2], axis=1), _FASTEST_M_S) * (_CELLS - 1) / _FASTEST_M_S

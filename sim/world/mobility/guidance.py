@@ -316,7 +316,11 @@ class Guidance:
         landings = {row: command.speed_m_s for row, command in self._commands.items() if isinstance(command, _Land)}
         if landings or self._grounded:
             self._near_the_ground(wish, true, landings)
-        return kept_clear(wish, true, self._see_m) if len(at) > 1 and self._see_m else wish
+        if len(at) > 1 and self._see_m:
+            wish = kept_clear(wish, true, self._see_m)
+            if landings or self._grounded:
+                wish[self.grounded(true)] = 0.0
+        return wish
 
     def _expire(self, t_s: float, at: Rows) -> None:
         """Let every UAV hold its position whose velocity setpoint was not renewed in time."""

@@ -36,6 +36,8 @@ WALL_DB: Final = 20.0
 _BAND_HZ: Final = 500.0
 _SCREEN_M: Final = 0.1
 _LEAST_WIND_M_S: Final = 0.1
+_MOUTH_M: Final = 0.3
+"""The height above ground from which people call."""
 _WORST_SIGMA_RAD: Final = 1.0
 
 
@@ -90,7 +92,8 @@ class VoiceSensor(Sensor):
             near = np.flatnonzero(calling & (snr >= config.voice_snr_db))
             if not len(near):
                 continue
-            walls = self._solids.blocked(np.broadcast_to(truth.at[row], (len(near), 3)), places[near]) * WALL_DB
+            mouths = places[near] + [0.0, 0.0, _MOUTH_M]
+            walls = self._solids.blocked(np.broadcast_to(truth.at[row], mouths.shape), mouths) * WALL_DB
             calls = tuple(
                 self._call(offset[index], float(level[index] - wall), float(snr[index] - wall))
                 for index, wall in zip(near.tolist(), walls.tolist(), strict=True)

@@ -297,3 +297,14 @@ def test_the_first_load_is_drawn_whatever_its_name(make_scenario: MakeScenario) 
     drawing = run_pictures.delays(run_of(scenario, *records))
     assert drawing is not None
     assert run_pictures.delivery(run_of(scenario, *records)) is not None
+
+
+def test_where_the_places_of_survivors_are_not_known_nobody_is_said_not_to_be_confirmed(
+    make_scenario: MakeScenario,
+) -> None:
+    run = run_of(make_scenario(**SEARCH), *FOUND)
+    run.survivors, run.unplaced = (), "its map is gone"
+    drawing = mission_pictures.progress(run)
+    assert drawing is not None
+    assert "No survivor was approached or reached." in drawing.caption
+    assert mission_pictures.waits(run) is None

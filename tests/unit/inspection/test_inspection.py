@@ -6,13 +6,17 @@ import pty
 import subprocess
 import sys
 import time
+from array import array
 from pathlib import Path
 
 import pytest
 from textual.widgets import Input, Static, TabbedContent
 
+from fanet_mw.bus.link_stats import COUNTS, LinkStats
+from fanet_mw.bus.messages import Poses
 from fanet_mw.flavors import Mode
 from fanet_mw.mavlink import Encoder
+from fanet_mw.scenario import config
 from fanet_mw.trace import BoundExcludes, BoundStated, Delivered, Dropped, Generated, LetOut
 from fanet_mw.units import MS, US, Enu, NodeId, S
 from sim.inspection.inspection import Inspection, of_folder
@@ -150,6 +154,16 @@ def test_the_messages_of_a_folder_have_instants_of_the_swarm(folder: Path) -> No
     (first_us, _), *_ = run.telemetry()
     since = min(stream.first_ns for stream in of_folder(run).messages.streams.values())
     assert since == first_us * US - run.summary["epoch_unix_ns"] > 0
+
+
+def test_links_that_carry_nothing_any_more_are_shown_no_more() -> None:
+    seen = Inspection(config.build({}))
+    seen.take_links(LinkStats(1 * S, S, array("H", [1, 2]), array("I", [1] * COUNTS), array("q", [0])))
+    shown = []
+    for t_ns in (2 * S, 4 * S):
+        seen.take_poses(Poses(t_ns, array("H"), array("d")))
+        shown.append(len(seen.links))
+    assert shown == [1, 0]
 
 
 def test_a_folder_is_looked_at_as_of_the_end_of_its_run(folder: Path) -> None:

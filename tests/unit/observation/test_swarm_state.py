@@ -7,9 +7,11 @@ from kit import MakeScenario
 
 from fanet_mw.bus.link_stats import COUNTS, LinkStats
 from fanet_mw.bus.messages import Poses
+from fanet_mw.mavlink import BatteryState, Encoder
 from fanet_mw.trace import BoundStated, Delivered, Dropped, Generated, Record
-from fanet_mw.units import MS, S
+from fanet_mw.units import MS, NodeId, S
 from sim.observation.swarm_state import SwarmState
+from sim.observation.turns import turns
 
 
 def pose(state: SwarmState, t_ns: int, *, east_m_s: float = 0.0) -> None:
@@ -64,3 +66,25 @@ def test_links_are_forgotten_when_nobody_transmits_any_more(make_scenario: MakeS
     assert [row[:2] for row in state.link_rows()] == [(1, 2)]
     pose(state, 6 * S)
     assert not list(state.link_rows())
+
+
+def test_an_empty_battery_is_shown_as_empty(make_scenario: MakeScenario) -> None:
+    """MAVLink 2 cuts off zeros at the end of a message, among them a charge of 0 %."""
+    state = SwarmState(make_scenario())
+    pose(state, 1 * S)
+    shown = []
+    for charge in (50, 0, None):
+        battery = None if charge is None else BatteryState(12.0, 1.0, 0, charge)
+        state.take_tap(1, S, Encoder(NodeId(1), component=1).sys_status(battery))
+        shown.append(state.uavs[1].charge_percent)
+    assert shown == [50, 0, None]
+
+
+def test_turns_of_an_older_timetable_are_nobodys(make_scenario: MakeScenario) -> None:
+    frame = {"start_ms": 1000.0, "period_ms": 400.0, "turn_ms": 50.0, "contention_ms": 100.0}
+    newer = {**frame, "start_ms": 1800.0, "period_ms": 600.0}
+    reports = {1: {"turns": {**frame, "own": [0]}}, 2: {"turns": {**newer, "own": [0]}}}
+    found = turns(make_scenario(**{"nodes.count": 3}), reports)
+    assert found is not None
+    assert found.owners(1800 * MS + 120 * MS) == [2], "node 1 has heard nothing since"
+    assert {one.node for one in found.own} == {2}

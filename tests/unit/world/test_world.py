@@ -12,7 +12,7 @@ from fanet_mw.bus.radio_control import Cut, Mishap, MishapKind, Restore
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import Collided, Posed
+from fanet_mw.trace import Collided, FlightModeChanged, Posed
 from fanet_mw.units import MS, STILL, Enu, NodeId, S
 from sim.world.world import WorldActor
 
@@ -191,6 +191,13 @@ def test_the_radio_of_a_uav_that_crashes_on_the_ground_dies_at_once(make_scenari
     assert said_to_be_cut(advance(made, 6 * S)) == [(2.1, "crash-2")]
 
 
+def test_a_uav_that_crashes_among_others_that_all_stand_is_known_to_have_fallen(make_scenario: MakeScenario) -> None:
+    made = world(make_scenario, **{"nodes.on_ground": True})
+    made.receive(NAMES.radio_control, Mishap("node-2", NodeId(2), MishapKind.CRASH, STILL), 0)
+    assert [label for _, label in said_to_be_cut(advance(made, 2 * S))] == ["crash-2"]
+    assert [(one.node, one.mode) for one in made.records if isinstance(one, FlightModeChanged)] == [(2, "fallen")]
+
+
 def test_the_end_of_all_faults_gives_nobody_back_a_radio_that_died(make_scenario: MakeScenario) -> None:
     made = world(make_scenario, **{"nodes.altitude_m": 5})
     made.receive(NAMES.radio_control, Mishap("node-2", NodeId(2), MishapKind.CRASH, STILL), 0)
@@ -199,3 +206,12 @@ def test_the_end_of_all_faults_gives_nobody_back_a_radio_that_died(make_scenario
         made.receive(NAMES.radio_control, Restore(label), 4 * S)
         assert [message.label for _, message in made.outbox if isinstance(message, Cut)] == again
         made.outbox.clear()
+
+
+def test_a_uav_whose_battery_has_lost_all_falls(make_scenario: MakeScenario) -> None:
+    made = world(make_scenario, **{"sensors.battery_hz": 1, "nodes.altitude_m": 20})
+    steer(made, 1, Enu(0.0, 0.0, 30.0))
+    advance(made, 2 * S)
+    made.receive(NAMES.radio_control, Mishap("node-2", NodeId(2), MishapKind.BATTERY, Enu(0.0, 0.0, 0.0)), 2 * S)
+    assert said_to_be_cut(advance(made, 6 * S)) == [(2.1, "crash-2")]
+    assert [one.mode for one in made.records if isinstance(one, FlightModeChanged) and one.node == 2] == ["fallen"]

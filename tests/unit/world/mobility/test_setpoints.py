@@ -415,3 +415,12 @@ def test_a_flight_controller_lands_when_its_battery_is_nearly_empty_whatever_it_
     assert (1, "failsafe") in flying.modes
     assert flying.at(1)[2] < 0.5
     assert flying.collisions == [], "it landed, and did not fall"
+
+
+def test_who_has_landed_is_pushed_by_nobody_that_passes(make_scenario: MakeScenario) -> None:
+    flying = Flying(make_scenario, **{"mobility.model": "static", "world.engine": "kinematic", "nodes.altitude_m": 10})
+    flying.ask(1, SetpointKind.LAND)
+    before = flying.fly(20).world._engine.positions()[0].copy()
+    flying.ask(2, SetpointKind.POSITION, Enu(before[0] + 2.0, before[1], 5.0))
+    flying.fly(30)
+    assert np.array_equal(flying.world._engine.positions()[0], before)

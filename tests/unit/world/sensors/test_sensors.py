@@ -12,7 +12,8 @@ from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, S, direction
-from sim.world.environment.obstacles import Box, Hills, Obstacles
+from sim.world.environment.layout import positions
+from sim.world.environment.obstacles import Box, Hills, Obstacles, obstacles
 from sim.world.environment.solids import Solids
 from sim.world.environment.survivors import Survivors
 from sim.world.sensors.camera import PERSON_M, CameraSensor, recognized_share
@@ -211,6 +212,16 @@ def test_levels_differ_among_people_and_err_each_time(make_scenario: MakeScenari
     levels = [[call.level_db for call in told.values()] for told in (first, second)]
     assert_sigma([level - true for level, true in zip(levels[0], true_db, strict=True)], math.hypot(5, 2))
     assert_sigma([a - b for a, b in zip(*levels, strict=True)], 2 * math.sqrt(2))
+
+
+def test_the_ground_on_which_people_lie_hides_none_of_their_voices(make_scenario: MakeScenario) -> None:
+    scenario = make_scenario(**{"world.terrain_m": 30, "world.area_m": 1000, "nodes.altitude_m": 60})
+    solids = Solids(obstacles(scenario, np.array(positions(scenario))))
+    lying = np.random.default_rng(7).uniform(-480, 480, (200, 3))
+    lying[:, 2] = solids.ground_m(lying)
+    sensor = voice(make_scenario, *lying, solids=solids, **{"sensors.voice_share": 1.0})
+    above = Truth(0, lying + np.array([2.0, 1.0, 5.0]), np.zeros_like(lying))
+    assert [row for row, _ in sensor.read(above, range(200))] == [*range(200)]
 
 
 def test_a_wall_between_hides_a_voice(make_scenario: MakeScenario) -> None:

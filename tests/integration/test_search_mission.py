@@ -232,3 +232,12 @@ def test_the_lanes_of_two_that_are_lost_at_the_ends_of_a_line_are_searched_in_th
         lambda uav, topics: Lost(uav, topics, at_ns=32 * S) if uav.name in names else uav, seconds=98, keys=wide
     )
     assert mission_of(after)["coverage"] >= 0.955
+
+
+@pytest.mark.slow
+def test_200_uavs_have_the_plan_long_before_it_begins() -> None:
+    keys = ("nodes.count=200", "world.area_m=5000", "traffic.sources=[]", "radio.lead_ms=0", "radio.handover_ms=0")
+    outcome = simulate(find("rescue", [*keys, "duration_s=18", "seed=1"]))
+    planned_s = sorted(record.t_ns / S for record in outcome.records if type(record) is Planned)
+    assert len(planned_s) >= 200
+    assert planned_s[199] - planned_s[0] < 5.0

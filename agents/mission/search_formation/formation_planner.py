@@ -203,13 +203,16 @@ class FormationPlanner:
 
     def _lacks_plan(self, member: _HeardUav) -> bool:
         """True for a node that has said that it does not follow the plan, long after it could have been told."""
-        stated_ns = member.stated_ns
-        return stated_ns is not None and stated_ns - self._followed_ns > _BEHIND_NS and self._is_behind(member)
+        return self._is_behind(member, after_ns=_BEHIND_NS)
 
-    def _is_behind(self, member: _HeardUav) -> bool:
-        """True for a node whose status names no plan, or an older one than that of this node."""
-        plan = self.plan
-        return plan is not None and (member.revision == 0 or newer(plan.revision, member.revision, bits=_REVISION_BITS))
+    def _is_behind(self, member: _HeardUav, *, after_ns: int) -> bool:
+        """True for a node whose status names no plan, or an older one than that of this node, and was said `after_ns`
+        after this node began to follow its plan.
+        """
+        plan, stated_ns = self.plan, member.stated_ns
+        if plan is None or stated_ns is None or stated_ns - self._followed_ns <= after_ns:
+            return False
+        return member.revision == 0 or newer(plan.revision, member.revision, bits=_REVISION_BITS)
 
     def _adopt(self, plan: Search, now_ns: int) -> None:
         self.plan = plan
@@ -217,7 +220,7 @@ class FormationPlanner:
         self._told_ns, self._tellings_left = now_ns, _REPEATS
 
     def _tell_again(self, now_ns: int) -> None:
-        """Flood a plan several times, and later again for any node whose status names an older one."""
+        """Flood a plan several times, and later again for any node that says that it follows an older one."""
         since_ns = 3 * _REPEAT_NS if self._told_ns is None else now_ns - self._told_ns
         if self.plan is None:
             return
@@ -226,7 +229,7 @@ class FormationPlanner:
         if since_ns < _REPEAT_NS and not reminds:
             return
         behind = any(
-            self._is_behind(member) and now_ns - member.heard_ns < _REPEAT_NS
+            self._is_behind(member, after_ns=self._notice_ns) and now_ns - member.heard_ns < _REPEAT_NS
             for node, member in self._members.items()
             if node != self._node
         )

@@ -180,6 +180,22 @@ def test_a_plan_with_a_short_notice_is_told_again_a_second_before_it_begins() ->
     assert told_s == [1, 3, 9], "at once, before it begins, and 6 s later"
 
 
+def test_another_planner_tells_the_plan_to_who_says_after_it_that_it_has_none_and_not_to_who_said_so_before() -> None:
+    first = planner_with(45)
+    first.review(formation(), now_ns=S)
+    assert first.plan is not None
+    planner = planner_of(1, expected=2)
+    planner.status(SearchStatus(0, Enu(100, 0, 50), 2, 0, 100), now_ns=0)
+    planner.on_plan(first.plan)
+    for second in range(1, 25):
+        planner.on_neighbor(2, Enu(100, 0, 50), now_ns=second * S)
+        planner.review(formation(), now_ns=second * S)
+    assert planner.to_tell == []
+    planner.status(SearchStatus(25_000_000, Enu(100, 0, 50), 2, 0, 100), now_ns=25 * S)
+    planner.review(formation(), now_ns=25 * S)
+    assert planner.to_tell == [first.plan]
+
+
 def test_who_is_out_for_a_survivor_becomes_a_follower_and_until_it_is_back_others_close_ranks() -> None:
     planner, pattern = planner_with(45), formation()
     planner.status(SearchStatus(1, Enu(-400.0, 0.0, 50), 21, 0, 100, absent=True), now_ns=0)

@@ -186,7 +186,7 @@ class WorldActor(Actor):
         if not isinstance(message, Setpoint) or not 1 <= node <= len(self._ids) or not makes_sense(message):
             self._malformed += 1
         else:
-            if self._guidance.still:
+            if self._still:
                 self._ticks.resume(now_ns, tick_ns=self._scenario.world.tick_ns)
             here = self._engine.positions()[node - 1]
             if self._estimate is not None:
@@ -200,7 +200,7 @@ class WorldActor(Actor):
         if due_ns is None or now_ns < due_ns:
             return
         self._suffer(due_ns)
-        if not self._guidance.still or self._falling:
+        if not self._still or self._falling:
             self._move(before_ns, due_ns)
         else:
             self._record_modes(due_ns)
@@ -232,9 +232,14 @@ class WorldActor(Actor):
     # --- one tick -------------------------------------------------------------------------------------------------
 
     @property
+    def _still(self) -> bool:
+        """True while nothing changes: batteries drain in hover, too."""
+        return self._guidance.still and self._drain is None
+
+    @property
     def _period_ns(self) -> int:
         tick_ns = self._scenario.world.tick_ns
-        return max(tick_ns, min(_STILL_NS, self._suite.shortest_ns)) if self._guidance.still else tick_ns
+        return max(tick_ns, min(_STILL_NS, self._suite.shortest_ns)) if self._still else tick_ns
 
     def _suffer(self, now_ns: int) -> None:
         for mishap in self._mishaps.due(now_ns):

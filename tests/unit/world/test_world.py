@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fanet_mw.bus.messages import Gps, Poses, Setpoint, WifiScan
+from fanet_mw.bus.messages import Battery, Gps, Poses, Setpoint, WifiScan
 from fanet_mw.bus.radio_control import Cut, Mishap, MishapKind, Restore
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import ConfigError
@@ -215,3 +215,17 @@ def test_a_uav_whose_battery_has_lost_all_falls(make_scenario: MakeScenario) -> 
     made.receive(NAMES.radio_control, Mishap("node-2", NodeId(2), MishapKind.BATTERY, Enu(0.0, 0.0, 0.0)), 2 * S)
     assert said_to_be_cut(advance(made, 6 * S)) == [(2.1, "crash-2")]
     assert [one.mode for one in made.records if isinstance(one, FlightModeChanged) and one.node == 2] == ["fallen"]
+
+
+@pytest.mark.parametrize("engine", ["kinematic", "rotors"])
+def test_a_swarm_that_hovers_where_it_was_put_drains_its_batteries_and_falls_without_charge(
+    make_scenario: MakeScenario, engine: str
+) -> None:
+    made = world(make_scenario, **{"world.engine": engine, "sensors.battery_hz": 1, "nodes.altitude_m": 20})
+    told = [message for _, _, message in advance(made, 10 * S) if isinstance(message, Battery)]
+    assert told[-1].current_a > 10
+    assert told[-1].charge < 0.995
+    made.receive(NAMES.radio_control, Mishap("node-2", NodeId(2), MishapKind.BATTERY, Enu(0.0, 0.0, 0.0)), 10 * S)
+    assert [label for _, label in said_to_be_cut(advance(made, 16 * S))] == ["crash-2"]
+    assert made._engine.positions()[1][2] < 1.0
+    assert made._engine.positions()[0] == pytest.approx([-50.0, -50.0, 20.0], abs=1.0)

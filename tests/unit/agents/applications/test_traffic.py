@@ -71,9 +71,8 @@ def test_few_sources_are_members_and_not_the_leader(make_scenario: MakeScenario,
         assert scenario.leader not in chosen
 
 
-@pytest.mark.parametrize("sources", [8, 9])
-def test_as_many_sources_as_there_can_be_are_all_but_the_destination(make_scenario: MakeScenario, sources: int) -> None:
-    scenario = make(make_scenario, sources=sources, destination=4)
+def test_as_many_sources_as_there_can_be_are_all_but_the_destination(make_scenario: MakeScenario) -> None:
+    scenario = make(make_scenario, sources=8, destination=4)
     assert list(sources_of(scenario)) == [1, 2, 3, 5, 6, 7, 8, 9]
 
 

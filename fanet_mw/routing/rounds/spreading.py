@@ -256,14 +256,17 @@ class Spreading:
 
     def spared(self, neighbors: int) -> list[int]:
         """The keys of urgent packets that no neighbor lacks, though this node has not sent them: they are done."""
-        if self._lossy or not neighbors:
-            return []
-        served = neighbors & ~self._deaf()
         entries = [(key, self._entries[key]) for key in self._waiting]
-        found = [(key, entry) for key, entry in entries if not entry.sent and not served & ~entry.having]
+        found = [(key, entry) for key, entry in entries if not entry.sent and self._all_have(entry, neighbors)]
         for key, entry in found:
             self._settle(key, entry)
         return [key for key, _ in found]
+
+    def _all_have(self, entry: _Spread, neighbors: int) -> bool:
+        """Urgent: True if this node need not send it even once. Where frames are lost at random it must, because who
+        is heard to send shows whose links hold.
+        """
+        return bool(neighbors) and not self._lossy and not neighbors & ~entry.having
 
     def wanted(self, neighbors: int, *, start_ns: int, gone: int = 0) -> list[Packet]:
         """The urgent packets for a turn; forgets what nobody lacks, repeats nothing for `gone` ones."""
@@ -327,7 +330,7 @@ class Spreading:
         """Urgent packets that go in a bulk slot now, as they fit, most urgent first; they go in the turn as well."""
         taken = []
         for entry in sorted(self._hasty.values(), key=lambda entry: entry.rank):
-            if not self._lossy and neighbors and not neighbors & ~entry.having:
+            if self._all_have(entry, neighbors):
                 del self._hasty[_key(entry.packet)]
             elif len(entry.packet.frame) <= room:
                 room -= len(entry.packet.frame)

@@ -99,6 +99,15 @@ def test_urgent_packets_are_not_sent_again_for_a_deaf_neighbor_either() -> None:
     assert [made.wanted(nodes((3,)), start_ns=50 * S + turn * ROUND) for turn in range(2, 6)] == [[]] * 4
 
 
+def test_a_neighbor_that_seems_deaf_is_sent_what_is_new_once() -> None:
+    """Who cannot answer may hear all the same."""
+    made = spreading(near={})
+    vainly(made)
+    made.push(packet(1), src=2, now_ns=50 * S)
+    assert made.spared(nodes((2, 3))) == []
+    assert [one.header.seq for one in made.wanted(nodes((2, 3)), start_ns=51 * S)] == [1]
+
+
 def test_what_was_sent_again_while_a_neighbor_had_a_link_does_not_make_it_deaf() -> None:
     """It hears, and flies away."""
     links = [0] * 9

@@ -12,10 +12,9 @@ from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, mod
 
 from fanet_mw.bus.radio_control import Control
 from fanet_mw.scenario.cross_checks import disagreements
-from fanet_mw.scenario.stops import stops_of
 from fanet_mw.scenario.tables.clock import Clock
 from fanet_mw.scenario.tables.clusters import Clusters
-from fanet_mw.scenario.tables.faults import AnyFault
+from fanet_mw.scenario.tables.faults import AnyFault, stops_of
 from fanet_mw.scenario.tables.ground import Ground, PlannedOrder
 from fanet_mw.scenario.tables.mission import Mission
 from fanet_mw.scenario.tables.mobility import Mobility

@@ -83,7 +83,8 @@ def _retell(outcome: Outcome, recording: McapRecording) -> None:
                 else tuple((b - a) / span_s for a, b in zip(before[2:], one[2:], strict=True))  # type: ignore[assignment]
             )  # fmt: skip
         last |= posed
-        standing = {node: at for node, at in standing.items() if node not in last}
+        if posed:
+            standing = {node: at for node, at in standing.items() if node not in posed}
         states = {node: (*one[2:], *velocities[node]) for node, one in posed.items()}
         if t_ns % S == 0:
             states |= {node: (*at, *STILL) for node, at in standing.items()}

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
 from agents.applications.traffic import targets_of
-from emulator.channel.link_budget import heard_m
 from fanet_mw.errors import ConfigError
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.trace import (
@@ -27,6 +26,8 @@ from fanet_mw.trace import (
     RoleChanged,
 )
 from fanet_mw.units import Enu, S
+from sim.results.links_over_time import heard_between_m
+from sim.world.arrays import Values
 from sim.world.environment.layout import positions
 from sim.world.environment.survivors import place
 
@@ -74,6 +75,8 @@ class RunRecords:
     """The true places of the survivors, in the order of their ids."""
     unplaced: str = ""
     """Why the survivors' places are not known any more; empty if they are."""
+    _heard_m: Values | None = None
+    """The reach of the radio between each two nodes; None until somebody asks."""
 
     def read(self, records: Iterable[Record]) -> None:
         """Take in all records of these kinds; to be called once."""
@@ -130,8 +133,9 @@ class RunRecords:
 
     def reach_m(self, a: int, b: int) -> float:
         """How far the radio of one node is heard by that of another; the antenna of the post may have a gain."""
-        scenario = self.scenario
-        return heard_m(scenario.radio, gain_dbi=scenario.ground.gain_dbi if scenario.post in (a, b) else 0.0)
+        if self._heard_m is None:
+            self._heard_m = heard_between_m(self.scenario)
+        return float(self._heard_m[a - 1, b - 1])
 
     @property
     def searches(self) -> bool:

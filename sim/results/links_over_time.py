@@ -59,6 +59,12 @@ def connectivity(scenario: Scenario) -> float:
     return float(np.mean(shares))
 
 
+def heard_between_m(scenario: Scenario) -> Values:
+    """The greatest distance of reception between each two nodes, without shadowing and fading [m, n x n]."""
+    posts_m = heard_m(scenario.radio, gain_dbi=scenario.ground.gain_dbi)
+    return _of_pairs(scenario, heard_m(scenario.radio), dict.fromkeys(scenario.reaches, posts_m))
+
+
 def _of_pairs(scenario: Scenario, reach_m: float, others_m: Mapping[int, float]) -> Values:
     """The reach between each two nodes; `others_m`: that of all links of some nodes."""
     found = np.full((scenario.node_count, scenario.node_count), reach_m)
@@ -102,9 +108,7 @@ class LinksOverTime:
     """The links of each second of a run; rows and columns are node ids less one."""
 
     def __init__(self, outcome: Outcome) -> None:
-        scenario = outcome.scenario
-        posts_m = heard_m(scenario.radio, gain_dbi=scenario.ground.gain_dbi)
-        self._reach_m = _of_pairs(scenario, heard_m(scenario.radio), dict.fromkeys(scenario.reaches, posts_m))
+        self._reach_m = heard_between_m(outcome.scenario)
         self.seconds = max(1, -(-outcome.simulated_ns // S))
         self._instants = _instants(outcome, self.seconds + 1)
         self._near: dict[int, Flags] = {}

@@ -38,7 +38,7 @@ from agents.mission.search_formation.formation_planner import (
     NOTICE_IN_ROUNDS_NS,
     NOTICE_NS,
     FormationPlanner,
-    larger,
+    size_factor,
 )
 from agents.mission.search_formation.pattern import Pattern, fastest, fitted, of_few
 from agents.mission.search_formation.plan_exchange import PlanExchange
@@ -125,7 +125,7 @@ class Searcher:
         notice_ns = NOTICE_IN_ROUNDS_NS if scenario.routing.protocol == "rounds" else NOTICE_NS
         planner = FormationPlanner(
             node, roll_call, expected=nodes.count, deploy_speed_m_s=_DEPLOY * least_m_s,
-            notice_ns=round(larger(nodes.count) * notice_ns),
+            notice_ns=round(size_factor(nodes.count) * notice_ns),
             take_off_ns=take_off_ns(nodes.altitude_m) if nodes.on_ground else 0, turns_ns=turns_ns,
             random=stream(scenario.seed, "plan", node).random,
             of_few=lambda count, now_ns: None if self._is_swept(now_ns) else _of_few(scenario, count),

@@ -22,7 +22,7 @@ STATUS_S: Final = 12.0
 _MANY: Final = 60
 """All turns carry what all say: of more UAVs each sends its status less often, and a flood takes longer."""
 _SELDOM: Final = 3.0
-"""The greatest share by which it does: who says nothing for `_LOST_NS` is taken to have gone."""
+"""The greatest such factor: who says nothing for `_LOST_NS` is taken to have gone."""
 _LOST_NS: Final = 70 * S
 """A UAV from which nothing was received for this time does not plan any more, and if it is lost has no right to its
 place.
@@ -55,7 +55,7 @@ _LEAVE_NS: Final = 6 * S
 _REVISION_BITS: Final = 16
 
 
-def larger(uavs: int) -> float:
+def size_factor(uavs: int) -> float:
     """By how much more rarely a UAV of so many sends its status, and longer a flood takes, than in a small swarm."""
     return min(_SELDOM, max(1.0, uavs / _MANY))
 

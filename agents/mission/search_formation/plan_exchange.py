@@ -6,7 +6,7 @@ from typing import Final
 from agents.mission.navigation.neighbor_motions import falls
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox, OutgoingPacket
-from agents.mission.search_formation.formation_planner import STATUS_S, FormationPlanner, larger
+from agents.mission.search_formation.formation_planner import STATUS_S, FormationPlanner, size_factor
 from agents.mission.search_formation.pattern import Pattern
 from agents.mission.search_formation.roll_call import RollCall
 from agents.mission.search_formation.search_place import SearchPlace
@@ -49,7 +49,7 @@ class PlanExchange:
         self._own_motion, self._outbox = own_motion, outbox
         self._pattern = pattern
         self._random = random
-        self._status_ns, self._first_ns = STATUS_S * larger(uavs) * S, _FIRST_STATUS_S * larger(uavs) * S
+        self._status_ns, self._first_ns = STATUS_S * size_factor(uavs) * S, _FIRST_STATUS_S * size_factor(uavs) * S
         self._next_status_ns = 0
         self._adopted_ns = 0
         """The instant at which this UAV began to follow its plan."""

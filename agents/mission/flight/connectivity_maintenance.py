@@ -200,32 +200,36 @@ class ConnectivityMaintenance:
         return min(away)[1] if away else self._parted(now_ns)
 
     def missed(self, now_ns: int) -> int | None:
-        """A UAV beyond a lost one that this one would hear by now if both had hurried to close ranks: it is lost, too.
-        None if there is none.
+        """In the sweep: a UAV beyond a lost one that this one would hear by now if both had hurried to close ranks. It
+        is lost, too; None if there is none.
         """
         since_s = (self._formation.closing_s(now_ns) or 0.0) - _SETS_OUT_S
-        if since_s <= 0:
-            return None
+        if since_s <= 0 or not self._formation.is_taken_up(now_ns):
+            return None  # on the way to the places nobody knows well enough where another one should be
         near_m = _CLOSING * self._reach_m + _HURRIES * self._haste_m_s * since_s
         return next((node for left_m, node, _ in self._unheard(now_ns) if left_m <= near_m), None)
 
     def _unheard(self, now_ns: int) -> list[tuple[float, int, Motion]]:
         """The UAVs to which this one is tied and which it does not hear while ranks are closed: how far each would be
-        without the loss, its node, and the motion that it would have.
+        without the loss, its node, and the motion that it would have; before the sweep, where each is likely to be.
         """
         plan, pattern, place = self._formation.plan, self._formation.pattern, self._formation.place
         closing_s, swept_s = self._formation.closing_s(now_ns), self._formation.swept_s(now_ns)
-        if plan is None or pattern is None or place is None or closing_s is None or swept_s is None:
+        if plan is None or pattern is None or place is None or closing_s is None:
             return []
-        if self._bidding.is_absent(now_ns) or pattern.may_leave(place, swept_s):
+        if self._bidding.is_absent(now_ns) or pattern.may_leave(place, swept_s or 0.0):
             return []
-        unheard = []
-        for other in pattern.tethers(place, swept_s):
-            if self._neighbors.motion(plan.nodes[other], now_ns=now_ns) is None:
-                at, velocity = self._formation.known_at(other, swept_s)
-                left_m = self._own_motion.position.horizontal_to(at)
-                unheard.append((left_m, plan.nodes[other], Motion(at, velocity, now_ns)))
-        return unheard
+        missing = [
+            other
+            for other in pattern.tethers(place, swept_s or 0.0)
+            if self._neighbors.motion(plan.nodes[other], now_ns=now_ns) is None
+        ]
+        if swept_s is None:
+            motions = self._formation.likely_ways(missing, now_ns)
+        else:
+            motions = {at: Motion(*self._formation.known_at(at, swept_s), now_ns) for at in missing}
+        here = self._own_motion.position
+        return [(here.horizontal_to(way.position), plan.nodes[at], way) for at, way in motions.items()]
 
     def _parted(self, now_ns: int) -> Motion | None:
         """The motion of a UAV of another part that this one seeks on the way to the places, because their places are in

@@ -5,7 +5,7 @@ Teams and relays connect the swarm, so they stay near their places; a follower m
 """
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import Final
 
 from agents.mission.finding.phone_localization import Estimate
@@ -185,11 +185,20 @@ class SearchPlace:
 
     def parted_ways(self, now_ns: int) -> dict[int, Motion]:
         """Before the sweep: the likely motion of each UAV of another part on the way to its place, by that place."""
+        return {} if self.plan is None else self.likely_ways(range(len(self.plan.nodes)), now_ns, of=self.sought)
+
+    def likely_ways(
+        self, places: Iterable[int], now_ns: int, *, of: Collection[int] | None = None
+    ) -> dict[int, Motion]:
+        """Before the sweep: the likely motion of the UAV of each of these places on the way to it, by what it said last
+        of itself; `of`: of these UAVs only.
+        """
         plan, pattern, ways = self.plan, self.pattern, dict[int, Motion]()
         if plan is None or pattern is None or self.is_taken_up(now_ns):
             return ways
-        for place, node in enumerate(plan.nodes):
-            if node in self.sought and node in self._seen:
+        for place in places:
+            node = plan.nodes[place]
+            if node in self._seen and (of is None or node in of):
                 start, seen_ns = self._seen[node]
                 from_ns, goal = max(seen_ns, plan.start_us * US), pattern.at(place, 0.0)
                 at, velocity = _on_way(start, goal, from_ns=from_ns, to_ns=_taken_up_ns(plan), now_ns=now_ns)

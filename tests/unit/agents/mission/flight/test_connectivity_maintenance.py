@@ -295,6 +295,29 @@ def test_the_two_beside_a_gap_fly_to_where_the_other_one_was_until_they_would_he
         assert beyond == [lane_of(there, TAKEN_UP_NS + 60 * S), lane_of(there, TAKEN_UP_NS + 68 * S), None]
 
 
+def test_before_the_sweep_the_two_beside_a_gap_fly_to_where_the_other_one_is_likely_to_be() -> None:
+    """Its place has changed since it was heard last, and it may be late: who is out of reach there is not lost."""
+    now_ns, seen_ns, beyond = 35 * S, 33 * S, NodeId(LINE + 2)
+    for apart_m, meets in ((300.0, True), (180.0, False)):
+        board = Board(LINE, Enu(0, 0, UP_M))
+        tied = ConnectivityMaintenance(
+            board.own_motion, board.neighbors, board.place, board.tasks, reach_m=REACH_M, speed_m_s=10.0
+        )
+        board.place.see(beyond, Enu(apart_m, 0, UP_M), seen_ns)
+        assert tied.beyond_gap(now_ns) is None, "nobody is lost"
+        board.place.close_ranks({LINE + 1}, now_ns)
+        assert board.place.pattern is not None
+        goal, left_s = board.place.pattern.at(beyond - 1, 0.0), (TAKEN_UP_NS - seen_ns) / S
+        mate = tied.beyond_gap(now_ns)
+        assert (mate is not None) is meets
+        if mate is not None:
+            assert mate.position.east == pytest.approx(apart_m + 2.0 * (goal.east - apart_m) / left_s)
+            assert mate.velocity.east == pytest.approx((goal.east - apart_m) / left_s)
+        assert tied.missed(now_ns + 8 * S) is None
+        board.neighbors.on_hello(beyond, Motion(Enu(300.0, 0, UP_M), STILL, now_ns))
+        assert tied.beyond_gap(now_ns) is None, "it is heard"
+
+
 @pytest.mark.parametrize(
     ("parted", "east_m", "nearer", "lost", "sought"),
     [

@@ -6,6 +6,7 @@ A claim agrees if all hold, differs if all fail, and is otherwise partly so. A r
 runs that would come out differently if it were wrong; it counts as shown if all its statements hold.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -70,9 +71,10 @@ class Statement:
         found = self.interval
         return {
             "what": self.what,
-            "mean": found.mean,
-            "low": found.low,
-            "high": found.high,
+            **{
+                name: value if math.isfinite(value) else None  # of one run there are no ends, of none there is no mean
+                for name, value in (("mean", found.mean), ("low", found.low), ("high", found.high))
+            },
             "seeds": found.runs,
             "side": self.side,
             "threshold": self.threshold,

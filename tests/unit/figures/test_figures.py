@@ -9,11 +9,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pytest
 
 from emulator.pcap_file import PcapFile
 from fanet_mw.errors import ConfigError
 from sim.cli.app import app
+from sim.figures import figure11
 from sim.figures.all_figures import FIGURES, chosen
 from sim.figures.finished_runs import Runs, differences, keep, max_per_seed, mean_per_seed, read_kept
 from sim.figures.paper_claims import Claim, Finding, Reason, Statement, Verdict, above, alike, below
@@ -307,6 +309,25 @@ def test_kept_tables_are_drawn_by_the_command_and_missing_ones_are_named(
     assert "`fanet figures 9 --quick --rerun-older` makes them of one." in markdown
     assert app([*words, "10", "--draw-only"], result_action="return_value") == 1
     assert "has no table of it: fig10" in " ".join(capsys.readouterr().out.split())
+
+
+def test_a_figure_of_single_runs_has_a_page_although_no_interval_ends(nine, tmp_path) -> None:
+    table, _, _ = nine
+    render(FIGURES["9"], table.filter([seed == 1 for seed in table.column("seed").to_pylist()]), tmp_path)
+    _, markdown = (path.read_text() for path in write([tmp_path], tmp_path))
+    assert "[one run], claimed above 0.02: open" in markdown
+
+
+def test_the_interval_of_a_difference_holds_its_mean_on_either_side_of_0() -> None:
+    def row(case: str, seed: int, within: float) -> dict[str, object]:
+        found = {"pdr": 1.0, "bound.within_share": within, "delay_ms.p95": 100.0}
+        return {"case": case, "seed": seed, "status": "ok", "code": "0", **found}
+
+    rows = [row(case, seed, within) for seed in (1, 2, 3) for case, within in (("ours", 0.9), ("ours, at rest", 0.8))]
+    claim = figure11._motion_does_not_matter(Runs(pa.Table.from_pylist(rows)))
+    assert claim.verdict is Verdict.AGREES
+    within = claim.statements[1].interval
+    assert within.low <= within.mean <= within.high < 0
 
 
 def test_failed_runs_are_in_no_figure(nine) -> None:

@@ -7,6 +7,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -21,7 +22,7 @@ from sim.console import Console
 if TYPE_CHECKING:
     from pyarrow import Table
 
-    from sim.sweep.spec import Sweep
+    from sim.sweep.spec import Case, Sweep
     from sim.sweep.whole_sweep import Progress, RemainingRuns, Workers
 
 _err = Console(stderr=True)
@@ -88,10 +89,11 @@ def carry_out(
     from sim.sweep.tasks import tasks_of
     from sim.sweep.whole_sweep import RemainingRuns, run
 
-    tasks = tasks_of(wanted)
-    store = Store(out)
-    with store.alone():
-        store.read()
+    tasks, store = tasks_of(wanted), Store(out)
+    with contextlib.ExitStack() as held:
+        if out.exists() or not dry_run:
+            held.enter_context(store.alone())
+            store.read()
         plan = RemainingRuns(tasks, store, retry=retry, only_code=code() if rerun_older else None)
         workers = _workers(jobs, scheduler, plan, dry_run=dry_run)
         _say(_announcement(name, wanted, plan, workers))
@@ -128,23 +130,27 @@ def carry_out(
 def asked(what: str, sets: tuple[str, ...], seeds: int | None, variant: str | None) -> "tuple[str, Sweep]":
     """The sweep that the user means, and its name."""
     from sim.sweep import spec
-    from sim.sweep.spec import Sweep
     from sim.sweep.toml_values import axis
 
     name = Path(what).stem
-    if spec.is_sweep(what):
-        found = spec.find(what).variant(variant)
-    elif variant is not None:
-        raise ConfigError(f"--variant {variant}: {what} is a scenario; only a sweep file has variants")
-    else:
-        found = Sweep(base=what)
+    found = spec.find(what).variant(variant)
     require_said_once(sets)
     axes = dict(axis(text) for text in sets)
     fixed = {key: values[0] for key, values in axes.items() if len(values) == 1}
     grid = {key: values for key, values in axes.items() if len(values) > 1}
     kept = {key: values for key, values in found.grid.items() if key not in fixed}
-    found = found.model_copy(update={"set": {**found.set, **fixed}, "grid": {**kept, **grid}})
+    cases = tuple(_without(case, axes) for case in found.case)
+    found = found.model_copy(update={"set": {**found.set, **fixed}, "grid": {**kept, **grid}, "case": cases})
     return name, found if seeds is None else found.model_copy(update={"seeds": seeds})
+
+
+def _without(case: "Case", flags: Mapping[str, object]) -> "Case":
+    """A case without the keys that flags set; raises ConfigError where it sets a table of which one is a part."""
+    for key, table in product(flags, case.set):
+        if key.startswith(f"{table}."):
+            raise ConfigError(f"--set {key}: case {case.name} sets {table}, of which it is a part; set all of {table}")
+    kept = {name: {k: v for k, v in getattr(case, name).items() if k not in flags} for name in ("set", "grid")}
+    return case.model_copy(update=kept)
 
 
 def _workers(jobs: int | None, scheduler: str | None, plan: "RemainingRuns", *, dry_run: bool) -> "Workers":

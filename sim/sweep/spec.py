@@ -179,26 +179,19 @@ def shipped() -> list[str]:
 
 
 def find(name: str) -> Sweep:
-    """The sweep in a file, if the name has a slash or ends in .toml; otherwise the shipped sweep of that name."""
+    """The shipped sweep of this name, or that of a file with the key `base`; otherwise that of a scenario alone."""
     if not is_file(name, shipped()):
         if name not in shipped():
-            raise ConfigError(f"unknown sweep {name!r}; shipped: {', '.join(shipped())}; or give a .toml file")
+            return Sweep(base=name)
         return parse(files("sim.sweeps").joinpath(f"{name}.toml").read_text(encoding="utf-8"), source=f"sweep {name}")
     path = Path(name)
-    sweep = parse(read_text(path, what=str(path)), source=str(path))
+    text = read_text(path, what=name)
+    if "base" not in toml_of(text, source=name):
+        return Sweep(base=name)
+    sweep = parse(text, source=name)
     if sweep.base.endswith(".toml") and not Path(sweep.base).is_absolute():
         return sweep.model_copy(update={"base": str(path.parent / sweep.base)})
     return sweep
-
-
-def is_sweep(name: str) -> bool:
-    """True for a shipped sweep, and for a file with the key `base`, which scenarios do not have."""
-    if not is_file(name, shipped()):
-        return name in shipped()
-    try:
-        return "base" in toml_of(read_text(Path(name), what=name), source=name)
-    except ConfigError:
-        return False
 
 
 def parse(text: str, *, source: str) -> Sweep:
@@ -215,7 +208,9 @@ def _sentence(item: Mapping[str, Any]) -> str:
     """One mistake as `key = value: bound`."""
     key = ".".join(str(part) for part in item["loc"] if part not in {"int", "list[constrained-int]"})
     if item["type"] == "extra_forbidden":
-        return f"{key}: unknown key; known keys: {', '.join(Sweep.model_fields)}"
+        tables: Mapping[str, type[_Table]] = {"case": Case, "quick": SweepVariant, "full": SweepVariant}
+        table = tables.get(str(item["loc"][0]), Sweep)
+        return f"{key}: unknown key; known keys: {', '.join(table.model_fields)}"
     if item["type"] == "missing":
         return f"{key}: is missing"
     message = str(item["msg"])

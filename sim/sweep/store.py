@@ -22,7 +22,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.foreign_file import json_of
-from fanet_mw.whole_file import require_folder, writing
+from fanet_mw.whole_file import replacing, require_folder, writing
 from sim.results.run_folder import checked
 from sim.results.run_table import flat, read_parquet
 from sim.sweep.one_run import Finished
@@ -36,7 +36,7 @@ _SCHEMA: Final = pa.schema(
         for field in fields(Finished)
     ]
 )  # fmt: skip
-_UNFINISHED: Final = re.compile(r"\d{6,}-\d+\.tmp")
+_UNFINISHED: Final = re.compile(r"\.(runs|\d{6,12})\.parquet\.\d+\.new")
 _PART: Final = re.compile(r"\d{6,12}\.parquet")
 """The names of files that this store makes; no others are read or removed."""
 _ROW: Final = TypeAdapter(Finished)
@@ -72,10 +72,10 @@ class Store:
         """Read what earlier sweeps have finished here; half-written files are removed."""
         try:
             require_folder(self._parts)
-            names = sorted(path.name for path in self._parts.iterdir())
-            for left in filter(_UNFINISHED.fullmatch, names):
-                (self._parts / left).unlink()
-            self._files = [self._parts / name for name in names if _PART.fullmatch(name)]
+            for path in (*self.folder.iterdir(), *self._parts.iterdir()):
+                if _UNFINISHED.fullmatch(path.name):
+                    path.unlink()
+            self._files = sorted(path for path in self._parts.iterdir() if _PART.fullmatch(path.name))
             for path in self._files:
                 for row in _rows(path):
                     done = _ROW.validate_python(row)
@@ -150,17 +150,10 @@ class Store:
 
 def write_whole(path: Path, table: pa.Table) -> None:
     """Write a table so that it is complete or missing, even if the machine dies; raises ConfigError."""
-    fresh = path.with_name(f"{path.stem}-{os.getpid()}.tmp")
-    try:
-        fresh.unlink(missing_ok=True)
-        with fresh.open("xb") as file:  # with the mode that the umask gives, so that colleagues may read it
-            pq.write_table(table, file, compression="zstd")
-            file.flush()
-            os.fsync(file.fileno())
-        fresh.replace(path)
-    except OSError as error:
-        fresh.unlink(missing_ok=True)
-        raise ConfigError(f"{path}: cannot be written: {error.strerror or error}") from error
+    with writing(path), replacing(path) as file:
+        pq.write_table(table, file, compression="zstd")
+        file.flush()
+        os.fsync(file.fileno())
 
 
 def table_of(rows: Sequence[tuple[Task, Finished]], varied: Sequence[str]) -> pa.Table:

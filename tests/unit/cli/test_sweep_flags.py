@@ -27,6 +27,12 @@ def test_keys_are_set_one_by_one_or_together_before_or_behind_the_name(
     assert "24 runs (6 settings x 4 seeds)" in capsys.readouterr().err
 
 
+def test_a_dry_run_leaves_nothing_behind(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert carry_out("short", Sweep(base="quick"), out=tmp_path / "short", jobs=1, scheduler=None, dry_run=True) == 0
+    assert "1 run (1 setting x 1 seed); 1 process" in capsys.readouterr().err
+    assert [*tmp_path.iterdir()] == []
+
+
 @pytest.mark.slow
 def test_the_cpu_that_a_sweep_took_is_that_of_its_workers_too(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -104,6 +104,11 @@ def test_a_run_in_real_time_may_be_slowed_down_and_stays_the_same_run() -> None:
     [
         ("seeds = 3", "base: is missing"),
         ('base = "quick"\nseed = 1', "seed: unknown key; known keys: .*seeds"),
+        (
+            'base = "quick"\ncase = [{name = "a", seeds = 2}]',
+            "case.0.seeds: unknown key; known keys: name, set, grid, r",
+        ),
+        ('base = "quick"\nquick = {seed = 1}', "quick.seed: unknown key; known keys: like, seeds, set, grid, cases$"),
         ('base = "quick"\nseeds = 0', r"seeds.* = 0: .*greater than or equal to 1"),
         ('base = "quick"\n[grid]\nnodes.count = []', r"grid.nodes.count = \[\]"),
         ('base = "quick"\n[[case]]\nset.nodes.count = 5', "case.0.name: is missing"),
@@ -168,6 +173,34 @@ def test_flags_change_a_sweep_of_a_file(tmp_path) -> None:
     assert name == "mine"
     assert found.set["traffic.sources"] == 3
     assert found.grid == {"nodes.count": [6, 7, 8]}
+
+
+def test_flags_replace_what_a_case_sets_too(tmp_path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(FILE)
+    _, one = asked(str(path), ("routing.protocol=counter", "routing.gossip_p=0.9"), None, None)
+    assert {(s.changes["routing.protocol"], s.changes["routing.gossip_p"]) for s in one.settings()} == {
+        ("counter", 0.9)
+    }
+    _, two = asked(str(path), ("routing.gossip_p=0.7,0.8",), None, None)
+    found = {(setting.case, setting.changes["routing.gossip_p"]) for setting in two.settings()}
+    assert found == {(case, share) for case in ("flooding", "gossip") for share in (0.7, 0.8)}
+
+
+def test_a_flag_that_a_case_would_undo_is_refused() -> None:
+    with pytest.raises(ConfigError, match=r"--set traffic\.0\.interval_s: case \+ priorities sets traffic, .* part"):
+        asked("ablation", ("traffic.0.interval_s=1",), None, None)
+
+
+def test_what_is_no_sweep_has_no_variant_and_a_file_that_cannot_be_read_says_why(tmp_path) -> None:
+    with pytest.raises(ConfigError, match="--variant quick: the sweep has no variants"):
+        asked("flooding", (), None, "quick")
+    path = tmp_path / "mine.toml"
+    with pytest.raises(ConfigError, match=r"mine\.toml: cannot be read"):
+        asked(str(path), (), None, "quick")
+    path.write_text("base = ")
+    with pytest.raises(ConfigError, match=r"mine\.toml: not valid TOML"):
+        asked(str(path), (), None, "quick")
 
 
 def test_commas_within_brackets_and_quotes_belong_to_a_value() -> None:

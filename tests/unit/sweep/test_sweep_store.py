@@ -83,7 +83,7 @@ def test_a_sweep_that_is_ended_three_times_and_taken_up_again_is_byte_for_byte_a
         except KeyboardInterrupt:
             assert read(tmp_path).num_rows == len(ran) + len(workers.ran)
         ran += workers.ran
-        (tmp_path / "finished" / "half.tmp").write_bytes(b"PAR1 half written")
+        (tmp_path / "finished" / ".000099.parquet.7.new").write_bytes(b"PAR1 half written")
 
     assert len(ran) == len(set(ran)) == 4
     assert (tmp_path / TABLE).read_bytes() == (whole / TABLE).read_bytes()
@@ -92,11 +92,11 @@ def test_a_sweep_that_is_ended_three_times_and_taken_up_again_is_byte_for_byte_a
 def test_what_is_half_written_is_removed_and_what_is_not_ours_is_left_alone(tmp_path) -> None:
     parts = tmp_path / "finished"
     parts.mkdir()
-    for name in ("000007-123.tmp", "notes.txt", "mine.tmp", "mine.parquet"):
-        (parts / name).write_bytes(b"PAR1 half written")
-    store = Store(tmp_path)
-    store.read()
-    assert [path.name for path in parts.iterdir() if path.name[0] == "0"] == []
+    left = {parts / "notes.txt", parts / "mine.parquet", tmp_path / ".mine.parquet.5.new"}
+    for path in (*left, parts / ".000007.parquet.123.new", tmp_path / ".runs.parquet.123.new"):
+        path.write_bytes(b"PAR1 half written")
+    Store(tmp_path).read()
+    assert {path for path in tmp_path.rglob("*") if path.is_file()} == left
 
 
 def test_progress_counts_what_was_finished_before(sweep, tmp_path) -> None:
@@ -241,11 +241,11 @@ def test_a_folder_that_leads_elsewhere_or_holds_no_results_of_runs_is_refused(tm
     elsewhere, out = tmp_path / "elsewhere", tmp_path / "out"
     for folder in (elsewhere, out):
         folder.mkdir()
-    (elsewhere / "000001-1.tmp").touch()
+    (elsewhere / ".000001.parquet.1.new").touch()
     (out / "finished").symlink_to(elsewhere)
     with pytest.raises(ConfigError, match="finished is no folder of its own"):
         Store(out).read()
-    assert (elsewhere / "000001-1.tmp").exists()
+    assert (elsewhere / ".000001.parquet.1.new").exists()
     (out / "finished").unlink()
     (out / ".lock").symlink_to(elsewhere / "made")
     with pytest.raises(ConfigError), Store(out).alone():

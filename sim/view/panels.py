@@ -43,7 +43,8 @@ class Panels:
         self.jobs: queue.SimpleQueue[Job] = queue.SimpleQueue()
         self._server, self._scene, self.state = server, scene, scene.state
         self._air, self._watches_air = air, False
-        self._second = self._image_ns = -1
+        self._second = -1
+        self._shown_image: CameraImage | None = None
         self._t_ns = 0
         self._history: dict[str, list[tuple[float, ...]]] = {}
         self._follows = False
@@ -109,14 +110,12 @@ class Panels:
 
     def show_image(self, image: CameraImage | None) -> None:
         """Show what the camera of the selected UAV sees; None: it has none."""
-        if image is None:
-            if self._image.visible:
-                self._image.visible = False
+        if image is self._shown_image:
             return
-        if image.t_ns != self._image_ns:
-            self._image_ns = image.t_ns
+        self._shown_image = image
+        self._image.visible = image is not None
+        if image is not None:
             self._image.image = np.frombuffer(image.rgb, np.uint8).reshape(image.height, image.width, 3)
-            self._image.visible = True
 
     def select(self, node: int, *, from_list: bool = False) -> None:
         """Select a UAV; 0: none."""
@@ -149,19 +148,19 @@ class Panels:
         self._server.gui.add_button(label, color=color).on_click(self.later(act))
 
     def _add_uav_actions(self, nodes: Sequence[str], actions: Actions) -> None:
-        gui, scene = self._server.gui, self._scene
+        gui = self._server.gui
 
-        def chosen(act: Callable[[int], str]) -> Callable[[], str]:
-            return lambda: act(scene.selected) if scene.selected else "choose a UAV first"
+        def chosen(act: Callable[[int], str], *, flies: bool = True) -> Callable[[], str]:
+            return lambda: self._on_chosen(act, flies=flies)
 
-        self._button("cut its radio", chosen(actions.cut), color="orange")
+        self._button("cut its radio", chosen(actions.cut, flies=False), color="orange")
         self._button("let it crash", chosen(actions.crash), color="red")
         with gui.add_folder("its link to another", expand_by_default=False):
             other = gui.add_dropdown("other", nodes)
             loss = gui.add_slider("frames lost [%]", min=0, max=100, step=5, initial_value=100)
             self._button(
                 "degrade the link",
-                chosen(lambda node: actions.degrade(node, int(other.value), loss_share=loss.value / 100)),
+                chosen(lambda node: actions.degrade(node, int(other.value), loss_share=loss.value / 100), flies=False),
             )
         with gui.add_folder("send it", expand_by_default=False):
             by = "The post on the ground orders it, over the air." if actions.has_post else (
@@ -170,6 +169,13 @@ class Panels:
             self._button("send it to the mark", chosen(lambda node: self._sent(actions, node)))
             self._button("call it home", chosen(actions.recall))
             self._button("release it", chosen(actions.release))
+
+    def _on_chosen(self, act: Callable[[int], str], *, flies: bool = False) -> str:
+        """Do something to the selected UAV or, unless it takes one that `flies`, to the post."""
+        node = self._scene.selected
+        if flies and node == self.state.scenario.post:
+            return "the post on the ground does not fly"
+        return act(node) if node else "choose a UAV first"
 
     def _sent(self, actions: Actions, node: int) -> str:
         target = self._scene.target
@@ -191,7 +197,7 @@ class Panels:
             self._button("let a head crash", lambda: self._on_a_head(actions.crash), color="red")
         else:
             self._button("cut the radio that most others hear", lambda: self._on_a_hub(actions.cut), color="orange")
-            self._button("let that UAV crash", lambda: self._on_a_hub(actions.crash), color="red")
+            self._button("let that UAV crash", lambda: self._on_a_hub(actions.crash, flies=True), color="red")
         radius = gui.add_slider("jam: radius [m]", min=20, max=500, step=10, initial_value=150)
         self._button("jam at the mark, or about the UAV", lambda: self._jam(actions, radius.value), color="red")
         self._button("end all faults", actions.restore, color="green")
@@ -204,10 +210,10 @@ class Panels:
             return act(selected.head)
         return act(max(heads, key=lambda head: len(heads[head]))) if heads else "there is no head now"
 
-    def _on_a_hub(self, act: Callable[[int], str]) -> str:
-        """Do something to the UAV with the most neighbors, of those whose radio works."""
-        faulty = {fault.node for fault in self.state.faults.values()}
-        near = {node: len(others) for node, others in self.state.neighbors().items() if others and node not in faulty}
+    def _on_a_hub(self, act: Callable[[int], str], *, flies: bool = False) -> str:
+        """Do something to the node with the most neighbors, of those whose radio works; `flies`: not to the post."""
+        but = {fault.node for fault in self.state.faults.values()} | ({self.state.scenario.post} if flies else set())
+        near = {node: len(others) for node, others in self.state.neighbors().items() if others and node not in but}
         return act(max(near, key=lambda node: near[node])) if near else "nobody hears anybody now"
 
     def _jam(self, actions: Actions, radius: float) -> str:

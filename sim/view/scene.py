@@ -74,6 +74,8 @@ class Scene:
         """East, north and radius of the areas that were jammed from here."""
         self.target: tuple[float, float] | None = None
         """The place on the map that was clicked."""
+        self._chosen: tuple[object, ...] = ()
+        """What was chosen to be drawn when it was drawn last."""
         self._nodes: list[int] = []
         self._reach_m = heard_m(state.scenario.radio)
         self._handles: dict[str, Any] = {}
@@ -90,6 +92,10 @@ class Scene:
 
     def draw(self, t_ns: int, *, all_of_it: bool = False) -> None:
         """Draw the state at an instant; `all_of_it`: also what is otherwise drawn seldom."""
+        jams = self.jams.keys() & self.state.faults.keys()
+        chosen = (self.shown, self.size_m, self.target, jams)
+        all_of_it |= chosen != self._chosen  # time may stand
+        self._chosen = chosen
         with self._server.atomic():
             self._draw_uavs()
             self._draw_spreading(t_ns)
@@ -210,12 +216,11 @@ class Scene:
         self._rings("turn", places, [rgb(colors.GREEN)] * len(places), 1.15)
 
     def _draw_spreading(self, t_ns: int) -> None:
-        if not self.shown.spreading:
-            self._rings("spread", [], [], 0.85)
-            return
-        if self._packet is None or not 0 <= t_ns - self._packet_ns < _SHOWN_NS + _HOLDS_NS:
+        over = self._packet is None or not 0 <= t_ns - self._packet_ns < _SHOWN_NS + _HOLDS_NS
+        if self.shown.spreading and over:
             self._packet, self._packet_ns = self.state.newest(by_ns=t_ns - 3 * S), t_ns
-        if self._packet is None:
+        if not self.shown.spreading or self._packet is None:
+            self._rings("spread", [], [], 0.85)
             return
         (origin, _), packet = self._packet
         own_ns, uavs = self._own_time_ns(t_ns), self.state.uavs
@@ -244,17 +249,17 @@ class Scene:
                 _set(handle, visible=False)
             return
         at = np.array(places, np.float32)
-        paints = linear(tints)
+        paints, sizes = linear(tints), np.full(len(places), self.size_m, np.float32)
         if handle is None or len(handle.batched_positions) != len(places):
-            vertices, faces = shapes.ring(radius * self.size_m, 0.22 * self.size_m)
+            vertices, faces = shapes.ring(radius, 0.22)
             upright = np.tile(np.array([1, 0, 0, 0], np.float32), (len(places), 1))
             self._handles[name] = self._api.add_batched_meshes_simple(
-                f"/{name}", vertices, faces, upright, at, batched_colors=paints, lod="off", cast_shadow=False,
-                receive_shadow=False,
+                f"/{name}", vertices, faces, upright, at, batched_scales=sizes, batched_colors=paints, lod="off",
+                cast_shadow=False, receive_shadow=False,
             )  # fmt: skip
             return
         handle.batched_positions = at
-        _set(handle, batched_colors=paints, visible=True)
+        _set(handle, batched_scales=sizes, batched_colors=paints, visible=True)
 
     # --- twice a second -------------------------------------------------------------------------------------------
 

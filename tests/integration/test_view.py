@@ -19,6 +19,7 @@ import viser
 from kit import slow
 
 from fanet_mw.bus import codecs
+from fanet_mw.bus.messages import CameraImage
 from fanet_mw.errors import ConfigError
 from fanet_mw.trace import FlightModeChanged, MissionModeChanged
 from fanet_mw.units import S
@@ -327,6 +328,70 @@ def test_what_is_switched_off_is_not_drawn(server: viser.ViserServer, timeline: 
         found = server.scene.get_handle_by_name(f"/{name}")
         assert found is not None
         assert not found.visible, name
+
+
+def test_what_is_chosen_while_time_stands_is_drawn_at_once(server: viser.ViserServer, timeline: Timeline) -> None:
+    scene = Scene(server, timeline.at(15 * S), on_select=lambda _: None)
+    scene.selected = 1
+    scene.draw(15 * S)
+    scene.shown = scene.shown._replace(links=False, trails=False)
+    scene.size_m, scene.target = 33.0, (10.0, 20.0)
+    scene.draw(15 * S)
+    links, trails, ring, mark = (
+        server.scene.get_handle_by_name(f"/{name}") for name in ("links", "trails", "selected", "marks")
+    )
+    assert links is not None
+    assert trails is not None
+    assert not links.visible
+    assert not trails.visible
+    assert ring is not None
+    assert list(ring.batched_scales) == [33.0], "rings are as large as the UAVs in them"
+    assert mark is not None
+    assert mark.visible
+
+
+def test_a_jump_to_the_beginning_leaves_no_packet_on_the_screen(server: viser.ViserServer, folder: Path) -> None:
+    timeline = Timeline(folder)
+    scene = Scene(server, timeline.at(15 * S), on_select=lambda _: None)
+    scene.draw(15 * S)
+    spread = server.scene.get_handle_by_name("/spread")
+    assert spread is not None
+    assert spread.visible
+    scene.state = timeline.at(S)
+    scene.draw(S, all_of_it=True)
+    assert scene.spreading() is None
+    assert not spread.visible
+
+
+def test_an_image_is_shown_again_once_its_uav_is_chosen_again(server: viser.ViserServer, timeline: Timeline) -> None:
+    panels = Panels(server, Scene(server, timeline.at(S), on_select=lambda _: None), actions=None)
+    one, other = (CameraImage(5 * S, 1, 1, bytes([shade] * 3)) for shade in (10, 200))
+    for image in (one, None, one):
+        panels.show_image(image)
+        assert panels._image.visible == (image is not None)
+    panels.show_image(other)
+    assert panels._image.image.max() == 200, "of another UAV, of the same instant"
+
+
+def test_the_post_on_the_ground_is_asked_for_nothing_that_only_a_uav_can_do(
+    server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scenario = catalog.find("quick", ["ground.at_m=[0,0]"])
+    post, state, observed = scenario.post, SwarmState(scenario), Observed(scenario)
+    assert post is not None
+    monkeypatch.setattr(state, "neighbors", lambda: {1: (post,), 2: (post,), post: (1, 2)})
+    actions = Actions(VirtualFeed(observed))  # type: ignore[arg-type]
+    panels = Panels(server, Scene(server, state, on_select=lambda _: None), actions=actions)
+    observed.host.start()
+    assert panels._on_a_hub(actions.cut) == f"UAV {post}: radio off"
+    assert panels._on_a_hub(actions.crash, flies=True) == "UAV 1 crashes"
+    panels.select(post)
+    assert panels._on_chosen(actions.crash, flies=True) == "the post on the ground does not fly"
+    assert panels._on_chosen(actions.cut) == f"UAV {post}: radio off"
+    panels.select(3)
+    assert panels._on_chosen(actions.crash, flies=True) == "UAV 3 crashes"
+    panels.select(0)
+    assert panels._on_chosen(actions.crash, flies=True) == "choose a UAV first"
 
 
 def test_the_panel_says_what_the_state_knows(server: viser.ViserServer, timeline: Timeline) -> None:

@@ -89,7 +89,7 @@ def _simulate(chosen: "Scenario", output: OutputFlags) -> int:
                 on_failure=_say_failure,
             )
         why = None if recording is None else recording.failure
-        return _finish(outcome, output, {} if why is None else {str(output.record): why})
+        return finish(outcome, output, {} if why is None else {str(output.record): why})
 
 
 def launch(
@@ -184,7 +184,7 @@ def launch(
         failed = {name: f"fanet {name} ended with {how}" for name, how in companions.failed.items()}
         for sentence in failed.values():
             _say(sentence)
-        return _finish(outcome, output, {str(output.record): failed["record"]} if "record" in failed else {})
+        return finish(outcome, output, {str(output.record): failed["record"]} if "record" in failed else {})
 
 
 def plan(
@@ -292,19 +292,18 @@ def _say_failure(error: BaseException, what: str) -> None:
     _say(f"ended early: {what}")
 
 
-def _finish(outcome: "Outcome", output: OutputFlags, cut: dict[str, str] | None = None) -> int:
+def finish(outcome: "Outcome", output: OutputFlags, cut: dict[str, str] | None = None) -> int:
     """Write and show the result, in which `cut` names what else ends early; returns 0 only if it may be used."""
     from json import dumps
 
-    from sim.results import printed_summary
-    from sim.results.files import finish
+    from sim.results import files, printed_summary
 
     page = None
     if output.report and output.out is not None:
         from sim.report.page import write
 
         page = partial(write, [output.out], output.out)
-    summary: dict[str, Any] = finish(outcome, out=output.out, page=page, cut=cut)
+    summary: dict[str, Any] = files.finish(outcome, out=output.out, page=page, cut=cut)
     if output.json:
         sys.stdout.write(dumps(summary, indent=2) + "\n")
     else:

@@ -8,6 +8,7 @@ from cyclopts import Parameter
 from fanet_mw.errors import FanetError
 from sim.bus.running_swarms import DEFAULT_ENDPOINT
 from sim.cli.options import OutputFlags, ScenarioFlags, ScenarioName, ServiceFlags, SwarmFlags, warn_of
+from sim.cli.runs import finish
 from sim.console import Console, tell
 
 _err = Console(stderr=True)
@@ -40,9 +41,10 @@ def router(
     from sim.run.router import serve
 
     chosen = choice.realtime_scenario(scenario)
-    with OutputFlags(out=out, force=force).prepared():
+    output = OutputFlags(out=out, force=force)
+    with output.prepared():
         warn_of(listen, listens=True)
-        code: int = loop.run(
+        outcome = loop.run(
             serve(
                 chosen,
                 swarm=swarm or chosen.name,
@@ -52,14 +54,7 @@ def router(
                 on_event=tell,
             )
         )
-        if out is not None:
-            import json
-
-            from sim.results import printed_summary
-            from sim.results.file_names import SUMMARY_FILE
-
-            printed_summary.show(json.loads((out / SUMMARY_FILE).read_text(encoding="utf-8")), Console())
-        return code
+        return 0 if outcome is None else finish(outcome, output)
 
 
 def emulator(

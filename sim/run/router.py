@@ -1,5 +1,5 @@
-"""`fanet router`: the bus and the swarm clock for services that are started one by one; on request it collects their
-results.
+"""`fanet router`: the bus and the swarm clock for services that are started one by one; on request it collects what
+they do.
 """
 
 import asyncio
@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError
@@ -23,6 +23,10 @@ from fanet_mw.units import MS
 from sim.bus.rights import ROUTER
 from sim.bus.running_swarms import registered
 from sim.run.launcher.pauses import PauseWatch
+
+if TYPE_CHECKING:
+    from sim.results.outcome import Outcome
+    from sim.run.collecting.collector import Collector
 
 _STOP_HEARD_S: Final = 0.3
 """The time from telling services to stop until the bus is closed over which they are told."""
@@ -43,23 +47,22 @@ async def serve(
     on_event: Tell,
     out: Path | None = None,
     zenoh_config: Path | None = None,
-) -> int:
-    """Serve the bus and the clock until the scenario is over; with `out`, collect and write what the services did, also
-    what they did until a signal. Returns 1 when a result was asked for and may not be used; raises BusError when it
-    cannot listen.
+) -> "Outcome | None":
+    """Serve the bus and the clock until the scenario is over; with `out`, a folder for temporary files, return what the
+    services did, also what they did until a signal. Raises BusError when it cannot listen.
     """
     listen = with_port(listen)
     with contextlib.ExitStack() as held:
         bus = held.enter_context(Bus.serve(listen, config_of(zenoh_config, ROUTER)))
         held.enter_context(registered(swarm, listen))
         names, expected = Topics(swarm), expected_names(scenario)
-        collection = None
+        collector = None
         if out is not None:
-            from sim.run.collecting.router_collection import (
-                Collection,  # only imported here, because the figures of a result need numpy and a router does not
-            )
+            from sim.run.collecting.collector import Collector  # with numpy, which a router alone does not need
 
-            collection = held.enter_context(Collection(scenario, bus, names, out))
+            collector = Collector(scenario, bus.subscribe, names, now_ns=time.monotonic_ns, folder=out)
+            held.enter_context(contextlib.closing(collector))
+            bus.answer(names.standing, collector.standing)
         keeper = ClockKeeper(bus, names, time_scale=scenario.time_scale, expected=expected, scenario=scenario)
         pauses = held.enter_context(contextlib.closing(PauseWatch()))
         on_event(f"serving {listen}, waiting for {len(keeper.missing())} services of swarm {swarm}")
@@ -67,12 +70,12 @@ async def serve(
         began_s = time.monotonic()
         try:
             running = await keeper.start(timeout_s=START_PATIENCE_S)
-            clock, ready_s = SwarmClock(running), time.monotonic() - began_s
+            clock, ran_s = SwarmClock(running), time.monotonic()
             pauses.restart()
             on_event("all are there: the clock runs")
             signaled: asyncio.Future[int] = asyncio.get_running_loop().create_future()
             aborted, ended_ns = None, None
-            with heeding(partial(_settle, signaled)) if collection else contextlib.nullcontext():
+            with heeding(partial(_settle, signaled)) if collector else contextlib.nullcontext():
                 await asyncio.wait([signaled], timeout=max(0, clock.wait_s(scenario.duration_ns)))
                 teller.cancel()  # who leaves at the end is not missing
                 if signaled.done():
@@ -80,17 +83,26 @@ async def serve(
                     on_event(aborted)
                     ended_ns = await keeper.end_early(clock, duration_ns=scenario.duration_ns)
                 await asyncio.sleep(_LEAVING_S)
-                if collection is not None:
-                    await collection.last_words(_LAST_WORDS_S)
+                if collector is not None:
+                    await _last_words(collector)
         finally:  # no service may go on running on a bus that ends
             teller.cancel()
             keeper.stop()
             time.sleep(_STOP_HEARD_S)  # noqa: ASYNC251  (nothing else runs here, and a cancelled task cannot await)
-        if collection is None:
-            return 0
-        outcome = collection.outcome(ready_s=ready_s, epoch_unix_ns=running.epoch_unix_ns)
+        if collector is None:
+            return None
+        outcome = collector.outcome(
+            wall_s=time.monotonic() - ran_s, ready_s=ran_s - began_s, epoch_unix_ns=running.epoch_unix_ns
+        )
         stall_ms, paused = pauses.longest_ns / MS, pauses.summary()
-        return collection.finish(replace(outcome, aborted=aborted, ended_ns=ended_ns, stall_ms=stall_ms, pauses=paused))
+        return replace(outcome, aborted=aborted, ended_ns=ended_ns, stall_ms=stall_ms, pauses=paused)
+
+
+async def _last_words(collector: "Collector") -> None:
+    """Wait until all actors have sent their last reports, but no longer than `_LAST_WORDS_S`."""
+    end_s = time.monotonic() + _LAST_WORDS_S
+    while collector.unfinished() and time.monotonic() < end_s:  # noqa: ASYNC110  (other threads fill it)
+        await asyncio.sleep(0.05)
 
 
 def _settle(signaled: asyncio.Future[int], number: int) -> None:

@@ -17,6 +17,9 @@ from fanet_mw.hosts.clock import ClockKeeper, ClockListener
 from fanet_mw.hosts.presence import expected_names
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.fingerprint import fingerprint
+from sim.cli.options import OutputFlags
+from sim.cli.runs import finish
+from sim.results.outcome import Outcome
 from sim.run import router
 from sim.run.launcher.swarm import free_endpoint, launch
 
@@ -35,8 +38,10 @@ async def all_services(scenario: Scenario, endpoint: str) -> None:
             listener.changed.clear()
 
 
-def served(scenario: Scenario, out: Path | None, *, stop: signal.Signals | None = None) -> tuple[int, list[str]]:
-    """The router's exit code, and what it says, without who is missing before the start; it may be sent a signal."""
+def served(
+    scenario: Scenario, out: Path | None, *, stop: signal.Signals | None = None
+) -> tuple[Outcome | None, list[str]]:
+    """What the router has heard, and what it says, without who is missing before the start; it may get a signal."""
     endpoint, said = free_endpoint(), list[str]()
 
     def on_event(what: str) -> None:
@@ -44,11 +49,11 @@ def served(scenario: Scenario, out: Path | None, *, stop: signal.Signals | None 
         if stop is not None and what.startswith("all are there"):
             asyncio.get_running_loop().call_later(0.7, os.kill, os.getpid(), stop)
 
-    async def run() -> int:
+    async def run() -> Outcome | None:
         services = asyncio.ensure_future(all_services(scenario, endpoint))
-        code = await router.serve(scenario, swarm=SWARM.swarm, listen=endpoint, on_event=on_event, out=out)
+        heard = await router.serve(scenario, swarm=SWARM.swarm, listen=endpoint, on_event=on_event, out=out)
         await services
-        return code
+        return heard
 
     before = {number: signal.getsignal(number) for number in interrupts.SIGNALS}
     interrupts.install()
@@ -63,18 +68,21 @@ def test_services_that_leave_with_the_swarms_time_are_not_missing(
     make_scenario: MakeScenario, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(router, "WORD_EVERY_S", 0.1)
-    assert served(make_scenario(duration_s=0.5, warmup_s=0, drain_s=0), None) == (0, [])
+    assert served(make_scenario(duration_s=0.5, warmup_s=0, drain_s=0), None) == (None, [])
 
 
 def test_what_was_collected_until_a_signal_is_a_partial_result(
-    make_scenario: MakeScenario, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    make_scenario: MakeScenario, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(router, "_LAST_WORDS_S", 0.0)
-    code, said = served(make_scenario(duration_s=60, warmup_s=0, drain_s=0), tmp_path, stop=signal.SIGTERM)
-    assert (code, said) == (1, ["interrupted by SIGTERM"])
+    heard, said = served(make_scenario(duration_s=60, warmup_s=0, drain_s=0), tmp_path, stop=signal.SIGTERM)
+    assert said == ["interrupted by SIGTERM"]
+    assert heard is not None
+    assert finish(heard, OutputFlags(out=tmp_path)) == 1
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["aborted"] == "interrupted by SIGTERM"
     assert 1 < summary["simulated_s"] < 30
+    assert f"written to {tmp_path}" in capsys.readouterr().out
 
 
 async def test_no_swarm_is_launched_under_the_name_of_another_on_the_same_router(make_scenario: MakeScenario) -> None:

@@ -148,7 +148,7 @@ class TelemetryStreams:
             common.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: lambda _: encoder.extended_sys_state(self._landed()),
             common.MAVLINK_MSG_ID_SYS_STATUS: lambda now_ns: encoder.sys_status(
                 self._battery,
-                has_fix=self._fix_ns is not None and now_ns - self._fix_ns < _FIX_LASTS_NS,
+                has_fix=self._has_fix(now_ns),
                 fenced=self.flown.fenced,
                 beyond=self.flown.beyond,
             ),
@@ -335,11 +335,14 @@ class TelemetryStreams:
         return encoder.gps_raw(
             self.position,
             self.velocity,
-            has_fix=self._fix_ns is not None,
+            has_fix=self._has_fix(now_ns),
             fix_ns=fix_ns,
             satellites=satellites,
             hdop=hdop,
         )
+
+    def _has_fix(self, now_ns: int) -> bool:
+        return self._fix_ns is not None and now_ns - self._fix_ns < _FIX_LASTS_NS
 
     def _unix_ns(self, now_ns: int) -> int:
         flight = self._flight

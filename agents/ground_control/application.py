@@ -156,6 +156,8 @@ class GroundControl(Application):
         self._look_ns: int | None = None
         self._second, self._in_second = -1, 0
         self._counts: Counter[str] = Counter()
+        self._refusals: set[str] = set()
+        """Why setpoints were not flown, as it was said."""
         self._low = False
         self._link = Link()
         self._link_ns = 0
@@ -269,7 +271,7 @@ class GroundControl(Application):
             self._link, self._link_ns = Link(rssi_dbm, lost), now_ns
 
     def permits(self, course: Course, now_ns: int) -> bool:
-        return not (self._counts["commanded"] and self._pilot.commands)
+        return not self._pilot.commands
 
     def wake(self, now_ns: int) -> None:
         if self._look_ns is not None and now_ns >= self._look_ns:
@@ -330,13 +332,13 @@ class GroundControl(Application):
         self._send(self._one(common.MAVLINK_MSG_ID_MISSION_CURRENT, now_ns) or b"")
 
     def _on_local_setpoint(self, message: Any, _peer: Peer, now_ns: int) -> None:  # noqa: ANN401
-        here = self._pilot.position
-        place: Enu | None = None
+        given = from_ned(Ned(message.x, message.y, message.z))
         if message.coordinate_frame == common.MAV_FRAME_LOCAL_NED:
-            place = from_ned(Ned(message.x, message.y, message.z))
+            self._on_setpoint(message, given, now_ns)
         elif message.coordinate_frame == common.MAV_FRAME_LOCAL_OFFSET_NED:
-            place = here.plus(from_ned(Ned(message.x, message.y, message.z)))
-        self._on_setpoint(message, place, now_ns)
+            self._on_setpoint(message, self._pilot.position.plus(given), now_ns)
+        else:  # those of the body: vehicles of the world have no heading of their own
+            self._refuse_setpoint(f"Setpoint in frame {message.coordinate_frame}: not flown")
 
     def _on_global_setpoint(self, message: Any, _peer: Peer, now_ns: int) -> None:  # noqa: ANN401
         place = self._ground.place(message.coordinate_frame, message.lat_int, message.lon_int, message.alt)
@@ -346,17 +348,26 @@ class GroundControl(Application):
         self._counts["commanded"] += 1
         mask = message.type_mask
         velocity: Enu | None = None
-        if mask & _POSITION_IGNORED == _POSITION_IGNORED:
+        if mask & _POSITION_IGNORED:
             place = None
-            if mask & _VELOCITY_IGNORED != _VELOCITY_IGNORED:
+            if not mask & _VELOCITY_IGNORED and mask & _POSITION_IGNORED == _POSITION_IGNORED:
                 velocity = from_ned(Ned(message.vx, message.vy, message.vz))
         known = place if velocity is None else velocity
         if known is None or not all(math.isfinite(part) for part in known):
-            self._counts["senseless_setpoints"] += 1
+            self._refuse_setpoint("Setpoint of no whole place or velocity: not flown")
         elif not self._pilot.setpoint(place, velocity, now_ns):
             self._counts["refused_setpoints"] += 1
 
+    def _refuse_setpoint(self, why: str) -> None:
+        """Setpoints have no answer in MAVLink, and come many times a second: say why one is not flown once."""
+        self._counts["senseless_setpoints"] += 1
+        if why not in self._refusals:
+            self._refusals.add(why)
+            self._say(4, why)
+
     def _on_data_stream(self, message: Any, _peer: Peer, now_ns: int) -> None:  # noqa: ANN401
+        if self._over_air:
+            return  # telemetry has a pace of its own there
         rate = message.req_message_rate
         for message_id in _GROUPS.get(message.req_stream_id, ()):
             if not message.start_stop or not rate:

@@ -15,8 +15,8 @@ _SPEED: Final = common.MAV_CMD_DO_CHANGE_SPEED
 _JUMP: Final = common.MAV_CMD_DO_JUMP
 _FOREVER: Final = common.MAV_CMD_NAV_LOITER_UNLIM
 _DELAYS: Final = (common.MAV_CMD_NAV_DELAY, common.MAV_CMD_CONDITION_DELAY)
-_HEIGHT_M: Final = 1.5
-"""How exactly the height of a waypoint is met."""
+_HEIGHT_M: Final = 3.0
+"""How exactly the height of a waypoint or take-off is met, however near counts as reached."""
 _MOST_AT_ONCE: Final = 1000
 """Items without a place that are carried out in one step; jumps could go round for ever."""
 
@@ -112,7 +112,7 @@ class MissionFlight:
 
 
 def _is_near(place: Enu, here: Enu, command: int, reached_m: float) -> bool:
-    high = abs(here.up - place.up) <= max(_HEIGHT_M, reached_m)
+    high = abs(here.up - place.up) <= _HEIGHT_M
     if command == TAKEOFF or math.isnan(place.east):
         return high
     return high and math.hypot(here.east - place.east, here.north - place.north) <= reached_m

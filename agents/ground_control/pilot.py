@@ -17,7 +17,7 @@ from fanet_mw.flavors import Mode
 from fanet_mw.units import MS, Enu, S
 
 SETPOINT_LASTS_NS: Final = 1000 * MS
-"""Setpoints of a ground station must come more often than this; afterwards the UAV holds (PX4's COM_OF_LOSS_T)."""
+"""Velocities of a ground station must come more often than this; afterwards the UAV holds (PX4's COM_OF_LOSS_T)."""
 _THERE_M: Final = 2.5
 """A take-off or climb has ended within this distance of its height: a barometer drifts by that much."""
 _SINK_M_S: Final = 1.5
@@ -28,6 +28,8 @@ _OBEYS_NS: Final = 15 * S
 """A UAV that has not begun to sink this long after it was told to land stood on the ground already. Until then its
 flight controller may still be busy with earlier commands.
 """
+_OVER_M: Final = 3.0
+"""A landing begins within this distance of its place."""
 _UP_M: Final = 2.5
 """A UAV this high above the place where it stood has taken off."""
 _BRAKE_M_S: Final = 5.0
@@ -68,13 +70,15 @@ class Pilot:
         self._course: Course | None = None
         self._fly: Course | None = None
         self._setpoint_ns: int | None = None
+        self._commanded = False
+        """True once it has commanded anything."""
         self._ground_m = home.up
         self.beyond = False
 
     @property
     def commands(self) -> bool:
         """True while an operator's commands fly the UAV, and no application of the swarm does."""
-        return not (self.mode is Mode.MISSION and self.mission.idle and self.has_task)
+        return self._commanded and not (self.mode is Mode.MISSION and self.mission.idle and self.has_task)
 
     @property
     def cruise_m_s(self) -> float:
@@ -102,12 +106,14 @@ class Pilot:
         return self.allows(place._replace(up=max(_LOWEST_M, place.up)) if step.command == LAND else place)
 
     def arm(self) -> bool:
-        self.armed = True
+        self.armed = self._commanded = True
         return True
 
     def disarm(self) -> bool:
         if self.on_ground:
             self.armed = False
+            if not self.mission.idle:
+                self.hold()
         return self.on_ground
 
     def take_off(self, up_m: float | None) -> bool:
@@ -126,10 +132,8 @@ class Pilot:
         return True
 
     def hold(self) -> bool:
-        if self.on_ground:
-            self._enter(Mode.HOLD, None)
-            return True
-        self._enter(Mode.HOLD, Course(self.position, _BRAKE_M_S))
+        climbs = self._course is not None and self._course.take_off
+        self._enter(Mode.HOLD, None if self.on_ground and not climbs else Course(self.position, _BRAKE_M_S))
         return True
 
     def go_home(self) -> bool:
@@ -158,7 +162,9 @@ class Pilot:
         if self.mode is not Mode.GUIDED or self.on_ground or not self.armed:
             return False
         if velocity is not None:
-            speed = min(velocity.norm(), self.settings.known[self.settings.index(names.SPEED) or 0].most)
+            speed, most = velocity.norm(), self.settings.known[self.settings.index(names.SPEED) or 0].most
+            if speed > most:
+                speed, velocity = most, Enu(*(part * most / speed for part in velocity))
             course = Course(self.position, max(0.1, speed), velocity)
         else:
             if place is None or not self.allows(place):
@@ -199,6 +205,8 @@ class Pilot:
         self.position, self.velocity = position, velocity
         if self.on_ground and position.up > self._ground_m + _UP_M:
             self.on_ground, self.armed = False, True  # the swarm's own task may have taken off
+        if self.mode is Mode.MISSION and not self.mission.idle:
+            self._fly_step(now_ns)
         if self.on_ground:
             return
         if self.mode is Mode.LAND or (self._course is not None and self._course.land):
@@ -208,8 +216,6 @@ class Pilot:
                 self._enter(Mode.HOLD, Course(self._course.position, _BRAKE_M_S))
         elif self.mode is Mode.RETURN:
             self._return()
-        elif self.mode is Mode.MISSION and not self.mission.idle:
-            self._fly_step(now_ns)
         elif self.mode is Mode.GUIDED and self._course is not None and self._course.velocity is not None:
             assert self._setpoint_ns is not None, "a velocity came as a setpoint"
             if now_ns - self._setpoint_ns > SETPOINT_LASTS_NS:
@@ -231,6 +237,7 @@ class Pilot:
     def _enter(self, mode: Mode, course: Course | None) -> None:
         if mode is not Mode.MISSION and self.mode is Mode.MISSION:
             self.mission.pause()
+        self._commanded = True
         self.mode = mode
         self._command(course)
 
@@ -247,13 +254,10 @@ class Pilot:
             (self.home, *self.rally), key=lambda place: math.hypot(here.east - place.east, here.north - place.north)
         ) if self.rally else self.home  # fmt: skip
         away_m = math.hypot(here.east - target.east, here.north - target.north)
-        least_m = self.home.up + self.settings[names.RETURN_HEIGHT]
-        reached = self.settings[names.ACCEPTANCE]
-        if away_m <= reached:
-            place = target._replace(up=0.0)
-            landing = self._course is not None and self._course.land
-            self._command(Course(place, _SINK_M_S, land=True) if landing else self._landing_at(place))
-        elif here.up < least_m - _THERE_M and away_m > 2 * reached and not self._crosses:
+        least_m = min(_HIGHEST_M, self.home.up + self.settings[names.RETURN_HEIGHT])
+        if away_m <= _OVER_M:
+            self._command(self._landing_at(target._replace(up=0.0)))
+        elif here.up < least_m - _THERE_M and away_m > 2 * _OVER_M and not self._crosses:
             self._command(Course(self._column(here)._replace(up=least_m), self.cruise_m_s))
         else:
             up_m = self._course.position.up if self._crosses and self._course else max(least_m, here.up)
@@ -282,7 +286,8 @@ class Pilot:
             mission.speed_m_s = None
         if mission.returns:
             self._say(_NOTICE, "Mission: returning")
-            self.go_home()
+            if not self.go_home():
+                self.hold()
         elif wanted is None:
             self._say(_NOTICE, "Mission finished: holding")
             self.hold()
@@ -302,7 +307,7 @@ class Pilot:
         if step.command == LAND:
             over_m = math.hypot(here.east - place.east, here.north - place.north)
             landing = self._course is not None and self._course.land
-            if landing or over_m <= self.settings[names.ACCEPTANCE]:
+            if landing or over_m <= _OVER_M:
                 return self._course if landing else self._landing_at(place)
             place = place._replace(up=max(place.up, here.up) if self._course is None else self._course.position.up)
         return Course(place, self.cruise_m_s)

@@ -48,10 +48,11 @@ def settings_of(scenario: Scenario, node: NodeId) -> Sequence[Setting]:
     """The parameters of a node, by name; what they are at the start is the scenario's."""
     mobility, mission = scenario.mobility, scenario.mission
     fastest = max(20.0, mobility.speed_m_s)
+    return_m = mobility.return_height_m + (node - 1) * mobility.return_step_m
     return sorted([
         Setting(SPEED, min(fastest, max(0.5, mobility.speed_m_s)), 0.5, fastest),
         Setting(TAKEOFF_HEIGHT, min(1000.0, max(5.0, scenario.nodes.altitude_m)), 5.0, 1000.0),
-        Setting(RETURN_HEIGHT, mobility.return_height_m + (node - 1) * mobility.return_step_m, 5.0, 2000.0),
+        Setting(RETURN_HEIGHT, min(1000.0, return_m), 5.0, 1000.0),
         Setting(ACCEPTANCE, 3.0, 0.5, 200.0),
         Setting(FENCE_ACTION, 2.0, 0.0, 5.0),
         Setting(SILENCE, 10.0, 1.0, 300.0),

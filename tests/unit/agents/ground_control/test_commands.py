@@ -6,11 +6,12 @@ from itertools import pairwise
 import pytest
 from operator_bench import GCS, LAT, LON, Bench, degrees, scenario
 
+from agents.ground_control.settings import settings_of
 from fanet_mw import mavlink
 from fanet_mw.application import Course, Fate, Received, Status
 from fanet_mw.flavors import Mode, number_of
 from fanet_mw.mavlink import Geodetic, common
-from fanet_mw.units import Enu, S
+from fanet_mw.units import STILL, Enu, NodeId, S
 
 ACCEPTED, LATER, DENIED, UNSUPPORTED = 0, 1, 2, 3
 ARM, TAKEOFF, LAND, HOME = 400, 22, 21, 20
@@ -678,3 +679,192 @@ def test_telemetry_that_the_network_refused_is_as_frequent_again_once_it_is_take
     assert intervals_s(100)[-1] >= 16 * usual_s
     assert intervals_s(125)[-1] >= 8 * usual_s, "two minutes after the refusal it is tried only twice as often"
     assert intervals_s(700)[-1] == usual_s
+
+
+def setpoint(bench: Bench, *, frame: int, mask: int, place: Enu = STILL, moves: Enu = STILL) -> None:
+    bench.say(common.MAVLink_set_position_target_local_ned_message(0, 1, 1, frame, mask, *place, *moves, 0, 0, 0, 0, 0))
+
+
+@pytest.mark.parametrize("frame", [common.MAV_FRAME_BODY_NED, common.MAV_FRAME_BODY_OFFSET_NED, 12, 0, 255])
+def test_a_velocity_over_the_nose_is_not_flown_to_the_north(frame: int) -> None:
+    bench = Bench().airborne()
+    bench.say(common.MAVLink_set_mode_message(1, 1, number_of(Mode.GUIDED)))
+    flown = len(bench.courses)
+    for _ in range(3):
+        setpoint(bench, frame=frame, mask=0b110111000111, moves=Enu(5, 0, 0))
+    assert len(bench.courses) == flown
+    assert bench.control.report()["operator_senseless_setpoints"] == 3
+    said = [text.text for text in bench.told("STATUSTEXT") if "frame" in text.text]
+    assert said == [f"Setpoint in frame {frame}: not flown"], "once, not with each setpoint"
+
+
+def test_of_a_setpoint_that_is_ignored_in_part_nothing_is_flown() -> None:
+    bench = Bench().airborne()
+    bench.say(common.MAVLink_set_mode_message(1, 1, number_of(Mode.GUIDED)))
+    flown = len(bench.courses)
+    setpoint(bench, frame=1, mask=0b110111000011, place=Enu(0, 0, -30), moves=Enu(5, 0, 0))  # a height and a velocity
+    setpoint(bench, frame=1, mask=0b110111100111, moves=Enu(5, 0, 9))
+    assert len(bench.courses) == flown
+    assert bench.control.report()["operator_senseless_setpoints"] == 2
+
+
+def test_a_velocity_is_no_greater_than_an_operator_may_ask_for() -> None:
+    bench = Bench().airborne()
+    bench.say(common.MAVLink_set_mode_message(1, 1, number_of(Mode.GUIDED)))
+    velocity(bench, 30, 40)
+    assert bench.courses[-1].velocity == pytest.approx((16, 12, 0))
+
+
+def test_who_was_refused_everything_has_taken_the_uav_from_nobody() -> None:
+    bench = Bench()
+    elsewhere = Course(Enu(10, 0, 20), 5.0)
+    for number in (common.MAV_CMD_REQUEST_PROTOCOL_VERSION, TAKEOFF, REPOSITION, MODE):
+        assert bench.command(number, 1, 99, 99) != ACCEPTED
+    bench.say(common.MAVLink_set_mode_message(1, 1, 77))
+    velocity(bench, 1, 0)
+    assert bench.control.permits(elsewhere, bench.now_ns)
+    bench.airborne()
+    assert not bench.control.permits(elsewhere, bench.now_ns)
+
+
+def test_an_operator_who_only_watched_and_goes_takes_the_uav_from_nobody() -> None:
+    bench = Bench(scenario(nodes={"count": 2}), at=Enu(0, 0, 50))
+    bench.run(2)
+    bench.run(20, heartbeats=False)
+    assert not bench.courses
+    assert bench.control.permits(Course(Enu(10, 0, 50), 5.0), bench.now_ns)
+
+
+def test_beyond_a_fence_nobody_but_the_operators_side_flies_though_it_was_never_commanded() -> None:
+    bench = Bench(scenario(mobility={"model": "random_waypoint", "speed_m_s": 5}, nodes={"count": 2}), at=Enu(0, 0, 50))
+    corners = [degrees(east, north) for east, north in ((100, 100), (200, 100), (200, 200), (100, 200))]
+    upload(bench, [(0, 5001, x, y, 0.0, (4, 0, 0, 0)) for x, y in corners], kind=1)
+    bench.run(2)
+    assert bench.flown.mode is Mode.HOLD
+    assert not bench.control.permits(Course(Enu(0, 0, 50), 5.0), bench.now_ns)
+
+
+@pytest.mark.parametrize("delay", [common.MAV_CMD_NAV_DELAY, common.MAV_CMD_CONDITION_DELAY])
+def test_a_mission_that_begins_with_a_delay_takes_off_after_it(delay: int) -> None:
+    bench = Bench()
+    assert upload(bench, [(2, delay, 0, 0, 0.0, (5, 0, 0, 0)), (6, TAKEOFF, 0, 0, 20.0, NONE)]) == ACCEPTED
+    bench.command(ARM, 1)
+    assert bench.command(START) == ACCEPTED
+    bench.run(4)
+    assert not bench.courses
+    bench.run(12)
+    assert bench.position.up == pytest.approx(20, abs=3)
+
+
+def test_who_is_disarmed_while_its_mission_waits_does_not_take_off() -> None:
+    bench = Bench()
+    upload(bench, [(2, common.MAV_CMD_NAV_DELAY, 0, 0, 0.0, (5, 0, 0, 0)), (6, TAKEOFF, 0, 0, 20.0, NONE)])
+    bench.command(ARM, 1)
+    bench.command(START)
+    bench.run(2)
+    assert bench.command(ARM, 0) == ACCEPTED
+    bench.run(10)
+    assert not bench.courses
+    assert bench.flown.mode is Mode.HOLD
+
+
+def test_a_mission_that_returns_from_the_ground_is_over_at_once() -> None:
+    bench = Bench()
+    upload(bench, [(2, HOME, 0, 0, 0.0, NONE)])
+    bench.command(ARM, 1)
+    bench.command(START)
+    bench.run(3)
+    assert bench.flown.mode is Mode.HOLD
+    assert len(bench.told("STATUSTEXT")) == 1
+
+
+def test_another_item_that_is_set_while_a_mission_lands_is_flown() -> None:
+    bench = Bench()
+    away = degrees(80, 0)
+    upload(bench, [(6, TAKEOFF, 0, 0, 20.0, NONE), (6, 16, *away, 20.0, NONE), (6, LAND, *degrees(0, 0), 0.0, NONE)])
+    bench.command(ARM, 1)
+    bench.command(START)
+    while not bench.courses[-1:] or not bench.courses[-1].land:
+        bench.run(1)
+    bench.run(3)
+    bench.say(common.MAVLink_mission_set_current_message(1, 1, 1))
+    bench.run(6)
+    assert not bench.courses[-1].land
+    assert bench.position.east > 30
+    bench.run(60)
+    assert bench.flown.on_ground
+    assert [reached.seq for reached in bench.told("MISSION_ITEM_REACHED")] == [0, 1, 1, 2]
+
+
+def test_who_is_told_to_hold_while_it_leaves_the_ground_climbs_no_farther() -> None:
+    bench = Bench()
+    bench.command(ARM, 1)
+    bench.command(TAKEOFF, 0, 0, 0, math.nan, math.nan, math.nan, 100)
+    bench.run(0.6)
+    assert bench.flown.on_ground
+    assert bench.command(PAUSE, 0) == ACCEPTED
+    bench.run(10)
+    assert bench.position.up < 10
+
+
+def test_a_return_higher_than_any_uav_flies_still_comes_home() -> None:
+    bench = Bench(at=Enu(0, 0, 0)).airborne()
+    answer = bench.say(common.MAVLink_param_set_message(1, 1, b"RTL_RETURN_ALT", 1500.0, 9))
+    assert [one.get_type() for one in answer] == ["PARAM_ERROR", "PARAM_VALUE"]
+    high = scenario(mobility={"model": "onboard", "return_height_m": 1000, "return_step_m": 100})
+    assert all(setting.least <= setting.default <= setting.most for setting in settings_of(high, NodeId(2)))
+    hill = Bench(at=Enu(0, 0, 300)).airborne(320)
+    assert go_to(hill, 100, 0, 320) == ACCEPTED
+    hill.run(15)
+    hill.say(common.MAVLink_param_set_message(1, 1, b"RTL_RETURN_ALT", 900.0, 9))
+    assert hill.command(HOME) == ACCEPTED
+    assert max(course.position.up for course in hill.courses) <= 1000
+
+
+def test_how_near_a_waypoint_counts_as_reached_moves_no_landing_and_lowers_no_return() -> None:
+    bench = Bench().airborne()
+    bench.say(common.MAVLink_param_set_message(1, 1, b"NAV_ACC_RAD", 100.0, 9))
+    assert go_to(bench, 90, 0, 20) == ACCEPTED
+    bench.run(15)
+    assert bench.command(HOME) == ACCEPTED
+    assert not bench.courses[-1].land
+    assert bench.courses[-1].position.up == pytest.approx(100)
+    bench.run(140)
+    assert bench.flown.on_ground
+    assert bench.position == pytest.approx((0, 0, 0), abs=3.5)
+
+
+def test_a_mission_lands_at_its_place_however_near_counts_as_reached() -> None:
+    bench = Bench()
+    bench.say(common.MAVLink_param_set_message(1, 1, b"NAV_ACC_RAD", 100.0, 9))
+    upload(bench, [(6, TAKEOFF, 0, 0, 20.0, NONE), (6, LAND, *degrees(80, 0), 0.0, NONE)])
+    bench.command(ARM, 1)
+    bench.command(START)
+    while bench.position.east < 1:
+        bench.run(0.2)
+    assert bench.position.up > 15, "a take-off is not over near the ground, either"
+    bench.run(60)
+    assert bench.position == pytest.approx((80, 0, 0), abs=3.5)
+
+
+def test_over_the_air_no_stream_changes_whichever_message_asks() -> None:
+    bench = Bench(scenario(ground={"at_m": [0, 0]}))
+    mav = common.MAVLink(None, srcSystem=255, srcComponent=190)
+    asked = common.MAVLink_request_data_stream_message(1, 1, common.MAV_DATA_STREAM_ALL, 20, 1)
+    frame, post = bytes(asked.pack(mav)), bench.scenario.post
+    assert post is not None
+    bench.control.on_message(Received(post, bench.node, 2, 0, 1, frame, content=frame), 0)
+    assert bench.streams.interval_ns(common.MAVLINK_MSG_ID_ATTITUDE) != S // 20
+
+
+def test_a_receiver_that_gives_no_more_fixes_has_none() -> None:
+    bench = Bench()
+    bench.run(2)
+
+    def fix_type() -> int:
+        bench.command(common.MAV_CMD_REQUEST_MESSAGE, common.MAVLINK_MSG_ID_GPS_RAW_INT)
+        return int(bench.told("GPS_RAW_INT")[-1].fix_type)
+
+    assert fix_type() == 3
+    bench.now_ns += 10 * S
+    assert fix_type() == 1

@@ -46,6 +46,7 @@ _VELOCITY_MASK: Final = 0b110111000111
 _MISSING: Final = (_UNKNOWN_U16, -1)
 _STREAM: Final = common.MAV_CMD_SET_MESSAGE_INTERVAL
 _MODE: Final = common.MAV_CMD_DO_SET_MODE
+_SPEED: Final = common.MAV_CMD_DO_CHANGE_SPEED
 _TAKES_OFF: Final = (_MODE, common.MAV_CMD_COMPONENT_ARM_DISARM, common.MAV_CMD_NAV_TAKEOFF)
 
 
@@ -101,6 +102,7 @@ class AutopilotLink:
         self._setpoint_ns = 0
         self._streamed = 0
         self._speed_m_s: float | None = None
+        """The speed that it was asked for last; None: none, or that question has been dropped or forgotten."""
 
     # --- in -------------------------------------------------------------------------------------------------------
 
@@ -131,6 +133,7 @@ class AutopilotLink:
             self.lost = False
             self.events.append("flight controller heard again")
             self._ask_streams()  # it may have started again
+            self._speed_m_s = None
         self._heard_ns = now_ns
         self.armed = bool(message.base_mode & common.MAV_MODE_FLAG_SAFETY_ARMED)
         before, self.mode = self.mode, mode_of(message.custom_mode, self._flavor)
@@ -198,6 +201,9 @@ class AutopilotLink:
     def _on_ack(self, message: Any, now_ns: int) -> None:  # noqa: ANN401
         if not self._waiting or message.command != self._waiting[0].command:
             return
+        if message.target_system not in (0, self.system) or message.target_component not in (0, COMPONENT):
+            self.counts["answers_to_others"] += 1
+            return
         if message.result == common.MAV_RESULT_IN_PROGRESS:
             self._sent_ns = now_ns
             return
@@ -233,8 +239,10 @@ class AutopilotLink:
     def command(self, setpoint: Setpoint, now_ns: int) -> None:
         """What the UAV's computer wants to be flown from now on."""
         before, self._wanted = self._wanted, setpoint
-        again = before is not None and before.kind is setpoint.kind and before.position == setpoint.position
         kind = setpoint.kind
+        again = before is not None and before.kind is kind and before.position == setpoint.position
+        if again and before is not None and kind is SetpointKind.POSITION:
+            again = before.speed_m_s == setpoint.speed_m_s
         if kind is SetpointKind.HOLD or (kind is SetpointKind.POSITION and setpoint.speed_m_s <= 0):
             self._hold = self.position if self._hold is None else self._hold
         else:
@@ -257,7 +265,7 @@ class AutopilotLink:
             self._ask_mode(Mode.LAND if kind is SetpointKind.LAND else Mode.RETURN)
         elif kind is SetpointKind.POSITION and setpoint.speed_m_s > 0 and setpoint.speed_m_s != self._speed_m_s:
             self._speed_m_s = setpoint.speed_m_s
-            self._ask(common.MAV_CMD_DO_CHANGE_SPEED, (1, setpoint.speed_m_s, -1), f"speed {setpoint.speed_m_s:g} m/s")
+            self._ask(_SPEED, (1, setpoint.speed_m_s, -1), f"speed {setpoint.speed_m_s:g} m/s")
 
     def _take_off(self, up_m: float) -> None:
         streams = [one for one in self._waiting if one.command == _STREAM]
@@ -365,6 +373,8 @@ class AutopilotLink:
     def _drop(self, is_over: Callable[[_Waiting], bool]) -> None:
         """Ask no more for what nobody wants any longer."""
         first = self._waiting[0] if self._waiting else None
+        if any(one.command == _SPEED and is_over(one) for one in self._waiting):
+            self._speed_m_s = None
         self._waiting = deque(one for one in self._waiting if not is_over(one))
         if not self._waiting or self._waiting[0] is not first:
             self._times = 0

@@ -2,13 +2,14 @@
 
     udpout:127.0.0.1:14550   send there, hear what comes back    udpin:0.0.0.0:14550   answer whoever speaks first
     tcpout:127.0.0.1:5760    connect, again and again            tcpin:0.0.0.0:5760    several ground stations
-    serial:/dev/ttyUSB0:57600
+    serial:/dev/ttyUSB0:57600                            open, and again when it was unplugged
 
 Also with `//` after the colon; `udp` and `tcp` are pymavlink's `udpin` and `tcpout`.
 """
 
 import asyncio
 import contextlib
+import errno
 import os
 import re
 import termios
@@ -53,7 +54,7 @@ def address_of(text: str, *, flag: str = "--mavlink") -> Address:
     host = host.strip("[]") or ("0.0.0.0" if kind.endswith("in") or kind == "udp" else "")  # noqa: S104  (its user wrote it)
     if kind not in _KINDS or not host or not re.fullmatch(r"[0-9]{1,7}", number):
         raise ConfigError(f"{flag} {text}: must be udpout:HOST:PORT, udpin:, tcpin:, tcpout: or serial:DEVICE:BAUD")
-    if kind == "serial" and not hasattr(termios, f"B{int(number)}"):
+    if kind == "serial" and not (int(number) and hasattr(termios, f"B{int(number)}")):
         raise ConfigError(f"{flag} {text}: {number} is no baud rate of this machine, for example 57600 or 921600")
     if kind != "serial" and not 0 < int(number) <= 65_535:
         raise ConfigError(f"{flag} {text}: port {number} must be in [1, 65535]")
@@ -66,7 +67,7 @@ class Connection:
     def __init__(self, address: Address, on_bytes: OnBytes) -> None:
         self.address = address
         self.dropped = 0
-        """Writes that did not reach a ground station because it reads too slowly, or is not there."""
+        """Writes that did not reach a ground station because it reads too slowly, or does not listen."""
         self._on_bytes = on_bytes
         self._peers: dict[object, Any] = {}
         """What takes bytes for each ground station, the one that spoke last at the end."""
@@ -88,7 +89,9 @@ class Connection:
                 task = loop.create_task(self._connect(host, port))
                 self._close.append(partial(_cancel, task))
             else:
-                self._open_serial(host, port)
+                line = _SerialLine(self, host, port)
+                line.open()
+                self._close.append(line.close)
         except OSError as error:
             raise BusError(f"{self.address}: {error.strerror or error}") from error
 
@@ -107,7 +110,10 @@ class Connection:
     def came(self, peer: object, write: Callable[[bytes], bool]) -> None:
         self._peers.pop(peer, None)
         while len(self._peers) >= _MOST_PEERS:
-            self._peers.pop(next(iter(self._peers)))
+            silent = next(iter(self._peers))
+            del self._peers[silent]
+            if isinstance(silent, _Stream):
+                silent.abort()
         self._peers[peer] = write
 
     def went(self, peer: object) -> None:
@@ -121,8 +127,11 @@ class Connection:
 
     def said(self, peer: object, data: bytes) -> None:
         answer = self._on_bytes(peer, data)
-        write = self._peers.get(peer)
-        if answer and write is not None:
+        write = self._peers.pop(peer, None)
+        if write is None:
+            return
+        self._peers[peer] = write
+        if answer:
             self._write(peer, write, answer)
 
     def _write(self, peer: object, write: Callable[[bytes], bool], data: bytes) -> None:
@@ -141,45 +150,6 @@ class Connection:
                 _, stream = await loop.create_connection(lambda: _Stream(self), host, port)
                 await stream.ended.wait()
             await asyncio.sleep(_AGAIN_S)
-
-    def _open_serial(self, device: str, baud: int) -> None:
-        line = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-        try:
-            tty.setraw(line)
-            settings = termios.tcgetattr(line)
-            settings[4] = settings[5] = getattr(termios, f"B{baud}")
-            termios.tcsetattr(line, termios.TCSANOW, settings)
-        except termios.error as error:
-            os.close(line)
-            raise BusError(f"{self.address}: it is no serial line") from error
-        loop = asyncio.get_running_loop()
-
-        def read() -> None:
-            try:
-                data = os.read(line, _READ_BYTES)
-            except BlockingIOError:
-                return
-            except OSError:
-                data = b""
-            if data:
-                self.said(device, data)
-            else:  # it was unplugged
-                loop.remove_reader(line)
-                self.went(device)
-
-        def write(data: bytes) -> bool:
-            try:
-                return os.write(line, data) == len(data)
-            except BlockingIOError:
-                return False
-
-        def close() -> None:
-            loop.remove_reader(line)
-            os.close(line)
-
-        loop.add_reader(line, read)
-        self.closes(close)
-        self.came(device, write)
 
 
 def _cancel(task: asyncio.Task[None]) -> None:
@@ -227,7 +197,7 @@ class _Stream(asyncio.Protocol):
 
     def connection_made(self, transport: Any) -> None:  # noqa: ANN401
         self._transport = transport
-        self._connection.closes(transport.abort)
+        self._connection.closes(self.abort)
 
         def write(data: bytes) -> bool:
             if transport.is_closing() or transport.get_write_buffer_size() > _MOST_WAITING:
@@ -237,10 +207,95 @@ class _Stream(asyncio.Protocol):
 
         self._connection.came(self, write)
 
+    def abort(self) -> None:
+        self._transport.abort()
+
     def data_received(self, data: bytes) -> None:
         self._connection.said(self, data)
 
     def connection_lost(self, _error: Exception | None) -> None:
         self._connection.went(self)
-        self._connection.closed(self._transport.abort)
+        self._connection.closed(self.abort)
         self.ended.set()
+
+
+class _SerialLine:
+    """A serial line; one that was unplugged is opened again, and again."""
+
+    def __init__(self, connection: Connection, device: str, baud: int) -> None:
+        self._connection, self._device, self._baud = connection, device, baud
+        self._loop = asyncio.get_running_loop()
+        self._line: int | None = None
+        self._rest = b""
+        """What the line had no room for of the last write; meanwhile others are dropped, so that none is cut."""
+        self._again: asyncio.TimerHandle | None = None
+
+    def open(self) -> None:
+        """Raises OSError; ENOTTY for what is no serial line."""
+        line = os.open(self._device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        try:
+            tty.setraw(line)
+            settings = termios.tcgetattr(line)
+            settings[4] = settings[5] = getattr(termios, f"B{self._baud}")
+            termios.tcsetattr(line, termios.TCSANOW, settings)
+        except termios.error as error:
+            os.close(line)
+            raise OSError(errno.ENOTTY, "it is no serial line") from error
+        self._line, self._rest = line, b""
+        self._loop.add_reader(line, self._read)
+        self._connection.came(self._device, self._write)
+
+    def close(self) -> None:
+        if self._again is not None:
+            self._again.cancel()
+        if self._line is not None:
+            self._loop.remove_reader(self._line)
+            self._loop.remove_writer(self._line)
+            os.close(self._line)
+            self._line = None
+
+    def _read(self) -> None:
+        assert self._line is not None, "only an open line is read"
+        try:
+            data = os.read(self._line, _READ_BYTES)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        if data:
+            self._connection.said(self._device, data)
+        else:  # it was unplugged
+            self.close()
+            self._connection.went(self._device)
+            self._try_again()
+
+    def _try_again(self) -> None:
+        self._again = self._loop.call_later(_AGAIN_S, self._open_again)
+
+    def _open_again(self) -> None:
+        try:
+            self.open()
+        except OSError:
+            self._try_again()
+
+    def _write(self, data: bytes) -> bool:
+        if self._line is None or self._rest:
+            return False
+        try:
+            self._rest = data[os.write(self._line, data) :]
+        except BlockingIOError:
+            return False
+        if self._rest:
+            self._loop.add_writer(self._line, self._write_rest)
+        return True
+
+    def _write_rest(self) -> None:
+        assert self._line is not None, "only an open line is written to"
+        try:
+            self._rest = self._rest[os.write(self._line, self._rest) :]
+        except BlockingIOError:
+            return
+        except OSError:
+            self._rest = b""  # it was unplugged
+        if not self._rest:
+            self._loop.remove_writer(self._line)

@@ -27,8 +27,6 @@ class Layout(NamedTuple):
     """What a gateway must know of one kind of message."""
 
     crc_extra: int
-    length: int
-    """Of the payload, extensions included."""
     target_at: int | None
     """Where the payload names the system for which it is; None: for all."""
 
@@ -45,7 +43,7 @@ def layout(message_id: int) -> Layout | None:
         if name == "target_system":
             target_at = at
         at += struct.calcsize(f"<{field}")
-    return Layout(known.crc_extra, known.unpacker.size, target_at)
+    return Layout(known.crc_extra, target_at)
 
 
 class Frame(NamedTuple):
@@ -75,7 +73,7 @@ def with_crc(head_and_payload: bytes, crc_extra: int) -> bytes:
 
 
 class Framing:
-    """The bytes of one ground station."""
+    """The bytes of one ground station; a payload may be longer than known here, as newer dialects have more fields."""
 
     def __init__(self, counts: Counter[str]) -> None:
         self._rest = b""
@@ -125,7 +123,7 @@ class Framing:
             return None
         body = data[: len(data) - signature]
         (crc,) = struct.unpack_from("<H", body, len(body) - 2)
-        if mcrf4xx(body[1:-2] + bytes((shape.crc_extra,))) != crc or data[1] > shape.length:
+        if mcrf4xx(body[1:-2] + bytes((shape.crc_extra,))) != crc:
             self._counts["bad_crc"] += 1
             return None
         if magic == _MAGIC_1:

@@ -122,7 +122,7 @@ class Gateway:
             signing = None if key is None else Signing(key, unix_ns=unix_ns)
             if signing is not None:
                 self._signings.append(signing)
-            link = Link(str(address), of, flavor=doors.flavor, signing=signing)
+            link = Link(str(address), of, flavor=doors.flavor, signing=signing, swarm=nodes)
             whole = address.kind.startswith("udp")
             return link, Connection(address, lambda peer, data: self._from_ground(link, peer, data, whole=whole))
 

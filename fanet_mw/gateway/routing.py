@@ -52,8 +52,18 @@ class _Numbers:
 class Link:
     """One connection, with the UAVs that are seen on it."""
 
-    def __init__(self, name: str, nodes: Collection[NodeId], *, flavor: Flavor, signing: Signing | None) -> None:
+    def __init__(
+        self,
+        name: str,
+        nodes: Collection[NodeId],
+        *,
+        flavor: Flavor,
+        signing: Signing | None,
+        swarm: Collection[NodeId] = (),
+    ) -> None:
+        """`swarm`: all UAVs, in whose names nobody may speak here; by default those that are seen."""
         self.name = name
+        self._uavs = {system_id(node) for node in swarm or nodes}
         self.counts: Counter[str] = Counter()
         """What has passed, and what has not: by reason."""
         self._nodes = {system_id(node): node for node in nodes}
@@ -103,7 +113,7 @@ class Link:
         """One frame, to those for whom it is; returns what the gateway answers in a UAV's place."""
         if self._signing is not None and not self._signing.believes(frame, self.counts):
             return b""
-        if frame.system in self._nodes or not frame.system:
+        if frame.system in self._uavs or not frame.system:
             self.counts["in_the_name_of_a_uav"] += 1
             return b""
         to = (

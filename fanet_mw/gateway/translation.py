@@ -22,7 +22,7 @@ def _again(message: Any, *, like: bytes) -> bytes:  # noqa: ANN401  (pymavlink h
 
 
 class Ardupilot:
-    """The translation for one ground station link. `homes` are asked of the vehicles that pass."""
+    """The translation for one ground station link, which learns homes from what vehicles say on it."""
 
     def __init__(self) -> None:
         self._home: dict[int, tuple[int, int, float]] = {}

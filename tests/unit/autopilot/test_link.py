@@ -22,6 +22,7 @@ from fanet_mw.hosts.timebase import THIS_MACHINE
 from fanet_mw.mavlink import Geodetic, common, decode, to_geodetic
 from fanet_mw.rng import stream
 from fanet_mw.units import MS, STILL, Enu, NodeId, S
+from fanet_mw.wire import COMPONENT
 
 ORIGIN = Geodetic(37.5665, 126.978, 0.0)
 AMSL_M = 40.0
@@ -268,6 +269,53 @@ def test_a_landing_does_not_wait_for_a_speed_that_nobody_acknowledges() -> None:
     controller.answers = True
     assert commands(controller.run(3)) == [176, 178], "the speed is said again after it"
     assert controller.mode is Mode.LAND
+
+
+def test_another_speed_on_the_way_to_the_same_place_is_asked_for() -> None:
+    controller = Controller()
+    controller.run(6)
+    controller.want(SetpointKind.POSITION, Enu(0.0, 0.0, 30.0), speed=6.0)
+    controller.run(3)
+    controller.want(SetpointKind.POSITION, Enu(0.0, 0.0, 30.0), speed=3.0)
+    (speed,) = [said for said in controller.run(3) if said.get_type() == "COMMAND_LONG"]
+    assert (speed.command, speed.param2) == (178, 3.0)
+
+
+@pytest.mark.parametrize("interrupted", ["by a pilot", "by a take-off", "by a restart"])
+def test_a_speed_that_nobody_carried_out_or_that_was_forgotten_is_asked_for_again(interrupted: str) -> None:
+    controller = Controller()
+    controller.run(6)
+    controller.want(SetpointKind.POSITION, Enu(0.0, 0.0, 30.0), speed=6.0)
+    controller.run(4)
+    controller.answers = interrupted == "by a restart"
+    controller.want(SetpointKind.POSITION, Enu(9.0, 0.0, 30.0), speed=9.0)
+    controller.run(0.2)
+    controller.answers = True
+    if interrupted == "by a pilot":
+        controller.mode = Mode.RETURN
+        controller.run(2)
+        controller.mode = Mode.GUIDED
+    elif interrupted == "by a take-off":
+        controller.want(SetpointKind.TAKEOFF, Enu(9.0, 0.0, 30.0))
+    else:
+        controller.silent = True
+        controller.run(4)
+        controller.silent = False
+    controller.run(10)
+    controller.want(SetpointKind.POSITION, Enu(0.0, 9.0, 30.0), speed=9.0)
+    assert 178 in commands(controller.run(2))
+
+
+def test_what_is_answered_to_another_computer_is_no_answer_to_ours() -> None:
+    """Ground stations on the same flight controller ask for streams, arm and set modes, too."""
+    controller = Controller()
+    controller.answers = False
+    controller.run(1.2)
+    controller.tell(common.MAVLink_command_ack_message(511, 0, 0, 0, 255, 190))
+    controller.tell(common.MAVLink_command_ack_message(511, 0, 0, 0, 7, 190))
+    assert not controller.link.counts["accepted"]
+    controller.tell(common.MAVLink_command_ack_message(511, 0, 0, 0, 7, COMPONENT))
+    assert controller.link.counts["accepted"] == 1
 
 
 def test_whoever_takes_over_is_left_alone_until_the_guided_mode_is_back() -> None:

@@ -8,6 +8,7 @@ import pytest
 from kit import slow
 
 from fanet_mw.flavors import Flavor, Mode, number_of
+from fanet_mw.gateway.framing import with_crc
 from fanet_mw.gateway.routing import Link
 from fanet_mw.gateway.signing import Signing
 from fanet_mw.mavlink import Encoder, common, decode
@@ -64,6 +65,22 @@ def test_what_does_not_pass_is_counted_by_its_reason(data: bytes, reason: str, c
     door = link()
     assert into(door, data) == {}
     assert door.counts[reason] == count
+
+
+def test_on_the_link_of_one_uav_nobody_speaks_in_the_name_of_another() -> None:
+    door = Link("test", NODES[:1], flavor=Flavor.PX4, signing=None, swarm=NODES)
+    assert into(door, said(arm(1), system=2)) == {}
+    assert door.counts["in_the_name_of_a_uav"] == 1
+    assert into(door, said(arm(1), system=9)) == {1: ["COMMAND_LONG"]}
+
+
+def test_a_message_with_a_field_that_is_newer_than_this_dialect_passes() -> None:
+    count = said(common.MAVLink_mission_count_message(2, 1, 3, 0))
+    payload = count[10:-2] + bytes(8) + b"\x07"
+    door = link()
+    newer = with_crc(bytes((count[0], len(payload))) + count[2:10] + payload, 221)  # CRC_EXTRA of MISSION_COUNT
+    assert into(door, newer) == {2: ["MISSION_COUNT"]}
+    assert not door.counts["bad_crc"]
 
 
 def test_a_stream_may_be_cut_anywhere() -> None:

@@ -101,7 +101,8 @@ class Rows(ScrollView, Generic[K], can_focus=True):
     def _strip(self, cells: Sequence[str], look: str) -> Strip:
         style = self.get_component_rich_style(look) if look else self.rich_style
         text = _GAP.join(column.cell(cell) for column, cell in zip(self._columns, cells, strict=True))
-        return Strip([Segment(f" {text}", style)]).crop_extend(0, self.size.width, style)
+        left = self.scroll_offset.x
+        return Strip([Segment(f" {text}", style)]).crop_extend(left, left + self.size.width, style)
 
     # --- what keys and clicks do ----------------------------------------------------------------------------------
 

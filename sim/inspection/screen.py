@@ -4,6 +4,7 @@ Whatever could not be looked at in time is counted in the last line.
 """
 
 import contextlib
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import ClassVar, Final
@@ -15,7 +16,7 @@ from textual.containers import Horizontal, VerticalScroll
 from textual.css.query import NoMatches
 from textual.widgets import Footer, Input, Static, TabbedContent, TabPane
 
-from fanet_mw.errors import BusError
+from fanet_mw.errors import BusError, ConfigError
 from fanet_mw.hosts import interrupts
 from fanet_mw.units import MS, S
 from sim.inspection.inspection import Inspection, LinkLine, of_folder
@@ -53,7 +54,7 @@ class Inspector(App[None]):
     #filter { height: 3; }
     TabbedContent { height: 1fr; }
     #detail, #ways-detail { border-left: solid $panel; padding: 0 1; }
-    #detail { width: 62; }
+    #detail { width: 62; max-width: 50%; }
     #status { height: 1; background: $panel; padding: 0 1; }
     """
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -300,6 +301,8 @@ def recorded(folder: Path) -> int:
 
 def _run(made: Callable[[Sequence[int]], Inspector]) -> None:
     """Run the screen until its user or a signal ends it; a signal that interrupted its event loop would not."""
+    if not (sys.stdin.isatty() and sys.stderr.isatty()):  # which textual reads, and draws on
+        raise ConfigError("fanet inspect: needs a terminal; fanet topic and fanet log print what scripts can read")
     signals: list[int] = []
     with interrupts.handed_to(signals.append):
         made(signals).run()

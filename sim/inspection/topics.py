@@ -11,7 +11,7 @@ from dataclasses import asdict, is_dataclass
 from itertools import pairwise
 from pathlib import Path
 from statistics import fmean, pstdev
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from fanet_mw import wire
 from fanet_mw.bus import codecs
@@ -28,7 +28,13 @@ _FRAMES: Final = ("frame", "data")
 """Fields that hold MAVLink frames."""
 
 
-class _Heard:
+class Malformed(NamedTuple):
+    """A put that holds no messages of the bus."""
+
+    why: str
+
+
+class Heard:
     """What is put on some topics, with the instant at which it came; what does not fit is counted."""
 
     def __init__(self, endpoint: str, swarm: str | None, name: str, zenoh_config: Path | None) -> None:
@@ -36,8 +42,8 @@ class _Heard:
         self._bus = Bus.join(endpoint, config_of(zenoh_config, OPERATOR))
         self._puts: queue.Queue[tuple[float, str, bytes]] = queue.Queue(_MOST_WAITING)
         try:
-            known = Topics(swarm or find_swarm(self._bus)).swarm
-            self.base = f"{ROOT}/{known}/"
+            self.swarm = Topics(swarm or find_swarm(self._bus)).swarm
+            self.base = f"{ROOT}/{self.swarm}/"
             self._bus.subscribe(name if name.startswith(f"{ROOT}/") else self.base + name, self._keep)
         except BaseException:
             self._bus.close()
@@ -63,7 +69,7 @@ class _Heard:
 
 
 def show_list(endpoint: str, swarm: str | None, *, seconds: float, zenoh_config: Path | None) -> int:
-    heard = _Heard(endpoint, swarm, "**", zenoh_config)
+    heard = Heard(endpoint, swarm, "**", zenoh_config)
     counts: Counter[str] = Counter()
     size: Counter[str] = Counter()
     kinds: dict[str, set[str]] = {}
@@ -74,7 +80,7 @@ def show_list(endpoint: str, swarm: str | None, *, seconds: float, zenoh_config:
         counts[topic] += 1
         size[topic] += len(payload)
         if len(kinds.setdefault(topic, set())) < 4:
-            kinds[topic] |= {type(message).__name__ for message in _decoded(payload)}
+            kinds[topic] |= {type(message).__name__ for message in decoded(payload)}
     shown = table(("topic", "messages", "Hz", "B/s"))
     for topic in sorted(counts, key=_by_number):
         name = topic.removeprefix(heard.base)
@@ -86,9 +92,9 @@ def show_list(endpoint: str, swarm: str | None, *, seconds: float, zenoh_config:
 
 
 def show_echo(endpoint: str, swarm: str | None, *, name: str, count: int | None, zenoh_config: Path | None) -> int:
-    heard, shown = _Heard(endpoint, swarm, name, zenoh_config), 0
+    heard, shown = Heard(endpoint, swarm, name, zenoh_config), 0
     for put in heard.puts():
-        for message in _decoded(put[2]) if put is not None else ():
+        for message in decoded(put[2]) if put is not None else ():
             sys.stdout.write(
                 json.dumps({"topic": put[1] if put else "", type(message).__name__: plain(message)}) + "\n"
             )
@@ -103,7 +109,7 @@ def show_rate(
     endpoint: str, swarm: str | None, *, name: str, count: int | None, zenoh_config: Path | None, of_bytes: bool
 ) -> int:
     """One line a second: how often something is put, or how many bytes."""
-    heard, shown, window = _Heard(endpoint, swarm, name, zenoh_config), 0, list[tuple[float, int]]()
+    heard, shown, window = Heard(endpoint, swarm, name, zenoh_config), 0, list[tuple[float, int]]()
     due_s = time.monotonic() + 1
     for put in heard.puts():
         if put is not None:
@@ -142,11 +148,11 @@ def bandwidth(window: list[tuple[float, int]]) -> str:
     return f"{per_s:.0f} B/s  mean: {fmean(sizes):.0f} B min: {min(sizes)} B max: {max(sizes)} B window: {len(window)}"
 
 
-def _decoded(payload: bytes) -> list[Any]:
+def decoded(payload: bytes) -> list[Any]:
     try:
         return list(codecs.decode(payload))
     except MalformedFrameError as error:
-        return [str(error)]
+        return [Malformed(str(error))]
 
 
 def _by_number(topic: str) -> list[tuple[int, str]]:

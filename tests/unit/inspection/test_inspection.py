@@ -14,6 +14,7 @@ from textual.widgets import Input, Static, TabbedContent
 
 from fanet_mw.bus.link_stats import COUNTS, LinkStats
 from fanet_mw.bus.messages import Poses
+from fanet_mw.errors import ConfigError
 from fanet_mw.flavors import Mode
 from fanet_mw.mavlink import Encoder
 from fanet_mw.scenario import config
@@ -23,8 +24,8 @@ from sim.inspection.inspection import Inspection, of_folder
 from sim.inspection.messages import Messages, fields_of, name_of
 from sim.inspection.packets import Packets
 from sim.inspection.rows import Rows
-from sim.inspection.screen import Inspector, turn_lines
-from sim.inspection.topics import bandwidth, plain, rate
+from sim.inspection.screen import Inspector, recorded, turn_lines
+from sim.inspection.topics import bandwidth, decoded, plain, rate
 from sim.observation.turns import Span, Turns
 from sim.results.files import finish
 from sim.results.run_folder import RunFolder
@@ -196,6 +197,18 @@ async def test_the_screens_show_a_recording(folder: Path) -> None:
         assert "messages" in str(app.query_one("#status", Static).render())
 
 
+async def test_on_a_terminal_of_80_columns_half_is_left_for_the_table(folder: Path) -> None:
+    app = Inspector(of_folder(RunFolder(folder)), title="a run", pump=lambda _: "", live=False)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.pause()
+        assert app.query_one("#streams", Rows).size.width >= 38
+
+
+def test_without_a_terminal_it_says_what_serves_instead(folder: Path) -> None:
+    with pytest.raises(ConfigError, match="fanet inspect: needs a terminal; fanet topic and fanet log"):
+        recorded(folder)
+
+
 async def test_a_frozen_screen_takes_nothing_in(folder: Path) -> None:
     pumps = []
     app = Inspector(Inspection(catalog.find("quick")), title="x", pump=lambda _: str(pumps.append(1)), live=True)
@@ -252,6 +265,12 @@ def test_rates_are_said_as_hands_that_know_ros_expect_them() -> None:
     assert bandwidth(window) == "555 B/s  mean: 55 B min: 50 B max: 60 B window: 11"
     assert rate(window[:1]) == "no rate yet: 1 puts"
     assert bandwidth([]) == "no bandwidth yet: 0 puts"
+
+
+def test_a_put_that_holds_no_messages_says_why() -> None:
+    (one,) = decoded(b"garbage")
+    assert type(one).__name__ == "Malformed"
+    assert plain(one)["why"]
 
 
 def test_a_message_becomes_json_with_its_mavlink_decoded() -> None:

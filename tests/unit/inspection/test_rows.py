@@ -40,6 +40,18 @@ async def test_only_rows_on_the_screen_are_worked_for() -> None:
         assert len({*asked}) == 2 * 19
 
 
+async def test_what_is_wider_than_the_screen_is_seen_by_scrolling() -> None:
+    app = OneTable()
+    async with app.run_test(size=(14, 6)) as pilot:
+        rows = app.query_one(Rows)
+        rows.show(range(3), lambda key: (str(key), f"row {key}"))
+        await pilot.pause()
+        assert (said(rows, 0), said(rows, 1)) == ("   number  nam", "        0  row")
+        rows.scroll_to(x=8, animate=False, immediate=True)
+        await pilot.pause()
+        assert (said(rows, 0), said(rows, 1)) == ("r  name", "0  row 0")
+
+
 async def test_keys_and_clicks_choose_a_row_that_stays_in_sight() -> None:
     app = OneTable()
     async with app.run_test(size=(60, 20)) as pilot:

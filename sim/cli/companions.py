@@ -118,11 +118,3 @@ def _begin(*, gives_way: bool) -> None:
     if gives_way:
         os.nice(_NICENESS)
     signal.signal(signal.SIGTTOU, signal.SIG_IGN)  # with `stty tostop` its first words would stop it
-
-
-def record_command(path: Path) -> list[str]:
-    return ["record", str(path.absolute()), "--quiet"]
-
-
-def view_command(port: int | None) -> list[str]:
-    return ["view", "--until-gone", *([] if port is None else ["--port", str(port)])]

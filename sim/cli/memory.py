@@ -5,7 +5,7 @@ Below these sizes numpy, LLVM and pybullet end a process with a page of tracebac
 
 import mmap
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -20,7 +20,7 @@ _NEEDED_MB: Final = {
     "order": 420, "autopilots": 420, "keys": 420,
 }  # fmt: skip
 """What commands need on two cores, measured as VmPeak (457, 590 and 739 MB) with a fifth more."""
-COMPILING_MB: Final = 760
+_COMPILING_MB: Final = 760
 """What compiling the kernel needs (604 MB)."""
 _CORE_MB: Final = 40
 """What a further core takes: the buffer and the stack of a thread of numpy's algebra."""
@@ -34,6 +34,16 @@ def require_for(words: Sequence[str]) -> None:
         need_mb = max(need_mb, _NEEDED_MB["report"])
     if need_mb and not {"--help", "-h"} & {*words}:
         require(need_mb, what=f"fanet {command}")
+
+
+def compile_kernel(tell: Callable[[str], None]) -> None:
+    """Compile the emulator's kernel, if that must be done, before runs begin; raises ConfigError."""
+    from emulator.compile_kernel import COMPILING_NOTICE, must_compile, warm_up
+
+    if must_compile():
+        require(_COMPILING_MB, what="compiling the kernel")
+        tell(COMPILING_NOTICE)
+        warm_up()
 
 
 def require(need_mb: int, *, what: str) -> None:

@@ -15,8 +15,8 @@ from cyclopts import Parameter
 from cyclopts.validators import Number
 
 from fanet_mw.errors import ConfigError, FanetError
-from sim.cli.companions import Companions, record_command, view_command
-from sim.cli.memory import COMPILING_MB, require
+from sim.cli.companions import Companions
+from sim.cli.memory import compile_kernel
 from sim.cli.options import DoorFlags, OutputFlags, ScenarioFlags, ScenarioName, print_notes, warn_of
 from sim.console import Console
 
@@ -52,7 +52,6 @@ def simulate(
 
 
 def _simulate(chosen: "Scenario", output: OutputFlags) -> int:
-    from emulator.compile_kernel import COMPILING_NOTICE, must_compile, warm_up
     from emulator.pcap_file import PcapFile
     from fanet_mw.hosts import interrupts
     from sim.cli.foreign_parts import own_output
@@ -62,10 +61,7 @@ def _simulate(chosen: "Scenario", output: OutputFlags) -> int:
 
     with output.prepared():
         print_notes(chosen)
-        if must_compile():
-            require(COMPILING_MB, what="compiling the kernel")
-            _err.print(COMPILING_NOTICE, highlight=False)
-            warm_up()
+        compile_kernel(_say)
         signals: list[int] = []
         path = output.capture_path()
         capture = PcapFile(path, chosen.radio, receptions=output.pcap_receptions) if path else nullcontext()
@@ -145,11 +141,11 @@ def launch(
         print_notes(chosen)
         warn_of(listen, listens=True)
         warn_of(connect, listens=False)
-        beside = [record_command(output.record)] if output.record is not None else []
+        beside = [] if output.record is None else [["record", str(output.record.absolute()), "--quiet"]]
         if view or view_port is not None:
             import viser  # noqa: F401  what is missing is said before the run
 
-            beside.append(view_command(view_port))
+            beside.append(["view", "--until-gone", *([] if view_port is None else ["--port", str(view_port)])])
         if (words := doors.command()) is not None:
             beside.append(words)
         if autopilots is not None:

@@ -111,7 +111,7 @@ def check(file: ScenarioName, *, choice: ScenarioFlags = ScenarioFlags()) -> int
     chosen = choice.scenario(file)
     require_possible(chosen)
     print_notes(chosen)
-    Console().print(f"{file}: {_sentence(chosen)}", highlight=False, soft_wrap=True, markup=False)
+    Console().print(f"{file}: {_sentence(chosen)}", highlight=False, soft_wrap=True)
     return 0
 
 

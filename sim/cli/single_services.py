@@ -9,9 +9,7 @@ from fanet_mw.errors import FanetError
 from sim.bus.running_swarms import DEFAULT_ENDPOINT
 from sim.cli.options import OutputFlags, ScenarioFlags, ScenarioName, ServiceFlags, SwarmFlags, warn_of
 from sim.cli.runs import finish
-from sim.console import Console, tell
-
-_err = Console(stderr=True)
+from sim.console import tell
 
 
 def router(
@@ -78,7 +76,7 @@ def emulator(
 
     chosen = choice.realtime_scenario(scenario)
     if must_compile():
-        _err.print(COMPILING_NOTICE, highlight=False)
+        tell(COMPILING_NOTICE)
     return run(chosen, join.address(chosen), pcap=pcap, receptions=pcap_receptions)
 
 

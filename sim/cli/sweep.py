@@ -15,7 +15,7 @@ from cyclopts import Parameter
 from cyclopts.validators import Number
 
 from fanet_mw.errors import ConfigError
-from sim.cli.memory import COMPILING_MB, require
+from sim.cli.memory import compile_kernel
 from sim.cli.options import require_said_once
 from sim.console import Console
 
@@ -100,8 +100,8 @@ def carry_out(
         _warn_of_codes(plan.codes, "they are run again" if rerun_older else _KEPT_NOTICE)
         if dry_run:
             return 0
-        if plan.todo:
-            _compile()
+        if plan.todo:  # once, so that not every worker does so for itself
+            compile_kernel(_say)
         began, began_cpu_s = time.monotonic(), processor_s()
         with own_output(json=json), _progress(name, quiet=json) as tell:
             try:
@@ -195,16 +195,6 @@ def runs_of_other_code(codes: Mapping[str, int]) -> str:
     return (
         f"{sum(others.values())} of {sum(codes.values())} finished runs are of other code ({by_code}; this is {code()})"
     )
-
-
-def _compile() -> None:
-    """Compile the kernel once, so that not every worker does so for itself."""
-    from emulator.compile_kernel import COMPILING_NOTICE, must_compile, warm_up
-
-    if must_compile():
-        require(COMPILING_MB, what="compiling the kernel")
-        _say(COMPILING_NOTICE)
-        warm_up()
 
 
 def _say(text: str, *, style: str | None = None) -> None:

@@ -79,7 +79,7 @@ def draw(runs: Runs) -> Drawing:
             continue
         means = [one.mean for one in by_edge]
         cdf.plot(DELAY_EDGES_S, means, color=look.color, linestyle=look.dash, label=look.label)
-        band(cdf, look, DELAY_EDGES_S, by_edge, most=1.0)
+        band(cdf, look, DELAY_EDGES_S, by_edge)
         drawn = means[::_CLASSES]
         histogram.stairs(
             [later - earlier for earlier, later in pairwise([0.0, *drawn])], [0.0, *DELAY_EDGES_S[::_CLASSES]],

@@ -6,7 +6,6 @@ A claim agrees if all hold, differs if all fail, and is otherwise partly so. A r
 runs that would come out differently if it were wrong; it counts as shown if all its statements hold.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -68,14 +67,9 @@ class Statement:
         return f"{self.what}: {self.interval.text(self.unit)}, {verb} {bound}: {self.finding}"
 
     def plain(self, verb: str = "claimed") -> dict[str, Any]:
-        found = self.interval
         return {
             "what": self.what,
-            **{
-                name: value if math.isfinite(value) else None  # of one run there are no ends, of none there is no mean
-                for name, value in (("mean", found.mean), ("low", found.low), ("high", found.high))
-            },
-            "seeds": found.runs,
+            **self.interval.plain(),
             "side": self.side,
             "threshold": self.threshold,
             "unit": self.unit,

@@ -27,7 +27,7 @@ def draw(runs: Runs) -> Drawing:
             by_edge = arrived(runs, f"{protocol}, {host}")
             means = [one.mean for one in by_edge]
             axes.plot(DELAY_EDGES_S[: len(means)], means, color=look.color, linestyle=look.dash, label=look.label)
-            band(axes, look, DELAY_EDGES_S[: len(means)], by_edge, most=1.0)
+            band(axes, look, DELAY_EDGES_S[: len(means)], by_edge)
             data += [
                 point(one, protocol=protocol, host=host, delay_s=edge)
                 for one, edge in zip(by_edge, DELAY_EDGES_S, strict=False)

@@ -36,12 +36,12 @@ class Recipe:
     caption: str
     """The caption: what is drawn, how it was run, and what can be seen."""
     draw: Callable[[Runs], Drawing]
-    claims: Callable[[Runs], list[Claim]] = lambda _: []
+    claims: Callable[[Runs], list[Claim]]
 
 
 def point(found: Interval, **where: object) -> dict[str, Any]:
     """One row of the data file beside a picture."""
-    return {**where, "mean": found.mean, "low": found.low, "high": found.high, "seeds": found.runs}
+    return {**where, **found.plain()}
 
 
 def render(recipe: Recipe, table: Table, folder: Path, *, variant: str = "quick") -> list[Claim]:

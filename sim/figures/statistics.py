@@ -52,6 +52,11 @@ class Interval(NamedTuple):
     def scaled(self, factor: float) -> "Interval":
         return Interval(self.mean * factor, self.low * factor, self.high * factor, self.runs)
 
+    def plain(self) -> dict[str, float | None]:
+        """As JSON and tables hold it: of one run there are no ends, of none there is no mean."""
+        known = {"mean": self.mean, "low": self.low, "high": self.high}
+        return {name: value if math.isfinite(value) else None for name, value in known.items()} | {"seeds": self.runs}
+
     def text(self, unit: str = "") -> str:
         """The interval as text, for example `0.91 s [0.88, 0.94]`."""
         unit = f" {unit}" if unit else ""

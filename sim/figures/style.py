@@ -170,10 +170,10 @@ def legend_above(figure: Figure, axes: Axes) -> None:
         legend.remove()
 
 
-def band(axes: Axes, look: Look, xs: Sequence[float], intervals: Sequence[Interval], *, most: float) -> None:
-    """The intervals of a line as a band, within [0, most]; there is none where a mean is of one run."""
-    if all(item.runs > 1 for item in intervals):
-        low, high = [max(0.0, item.low) for item in intervals], [min(most, item.high) for item in intervals]
+def band(axes: Axes, look: Look, xs: Sequence[float], shares: Sequence[Interval]) -> None:
+    """The intervals of a line of shares as a band; there is none where a mean is of one run."""
+    if all(item.runs > 1 for item in shares):
+        low, high = [max(0.0, item.low) for item in shares], [min(1.0, item.high) for item in shares]
         axes.fill_between(xs, low, high, color=look.color, alpha=0.15, linewidth=0)
 
 

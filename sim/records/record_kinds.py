@@ -6,15 +6,17 @@ A log on disk can leave most of what was not asked for undecoded, so analysis co
 as fast as Python its records.
 """
 
+from abc import abstractmethod
 from collections.abc import Iterable, Iterator
 from itertools import islice
-from typing import Any, Final, NamedTuple, Protocol, TypeVar, get_args, overload, runtime_checkable
+from typing import Any, Final, NamedTuple, TypeVar, get_args, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from fanet_mw import trace
 from fanet_mw.trace import Delivered, Record
+from sim.records.spool import OnDisk
 
 A = TypeVar("A", bound=Record)
 B = TypeVar("B", bound=Record)
@@ -25,20 +27,20 @@ CODES: Final = {kind: code for code, kind in enumerate(KINDS)}
 """The number of each kind, its index in `KINDS`, by which a log on disk names the kind of a record."""
 
 
-@runtime_checkable
-class StoredByKind(Protocol):
-    """A trace that can give the records of some kinds without decoding all the others."""
+class StoredTrace(OnDisk[Record]):
+    """A trace on disk, which can leave undecoded what is not asked for."""
 
+    @abstractmethod
     def of_kinds(self, kinds: tuple[type[Record], ...]) -> Iterator[Record]:
         """The records of these kinds, in the order of the trace."""
 
-
-@runtime_checkable
-class StoredAsLines(Protocol):
-    """A trace that stores each record as the line of text that the trace file has for it."""
-
     def lines(self) -> Iterator[bytes]:
         """The lines of the trace file."""
+        return _as_lines(self)
+
+    def delivery_columns(self) -> "Iterator[DeliveryColumns]":
+        """All deliveries in the order of the trace, in portions."""
+        return in_columns(self.of_kinds((Delivered,)))  # type: ignore[arg-type]
 
 
 @overload
@@ -55,15 +57,17 @@ def records_of(
 def records_of(records: Iterable[Record], *kinds: type[Record]) -> Iterator[Record]: ...
 def records_of(records: Iterable[Record], *kinds: type[Any]) -> Iterator[Any]:
     """The records of these kinds, in the order of the trace."""
-    if isinstance(records, StoredByKind):
+    if isinstance(records, StoredTrace):
         return records.of_kinds(kinds)
     return (record for record in records if type(record) in kinds)
 
 
 def lines(records: Iterable[Record]) -> Iterator[bytes]:
     """The lines of the trace file, each one JSON array."""
-    if isinstance(records, StoredAsLines):
-        return records.lines()
+    return records.lines() if isinstance(records, StoredTrace) else _as_lines(records)
+
+
+def _as_lines(records: Iterable[Record]) -> Iterator[bytes]:
     return (f"{trace.line(record)}\n".encode() for record in records)
 
 
@@ -83,18 +87,10 @@ class DeliveryColumns(NamedTuple):
     handover_ns: Column
 
 
-@runtime_checkable
-class StoredInColumns(Protocol):
-    """A trace that can give its deliveries as columns without making records of them."""
-
-    def delivery_columns(self) -> Iterator[DeliveryColumns]:
-        """All deliveries in the order of the trace, in portions."""
-
-
 def delivery_columns(records: Iterable[Record]) -> Iterator[DeliveryColumns]:
-    if isinstance(records, StoredInColumns):
-        return records.delivery_columns()
-    return in_columns(records_of(records, Delivered))
+    return (
+        records.delivery_columns() if isinstance(records, StoredTrace) else in_columns(records_of(records, Delivered))
+    )
 
 
 def in_columns(deliveries: Iterable[Delivered]) -> Iterator[DeliveryColumns]:

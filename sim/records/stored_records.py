@@ -8,8 +8,8 @@ from typing import Final
 
 from fanet_mw import trace
 from fanet_mw.trace import Delivered, Generated, Record
-from sim.records.record_kinds import CODES
-from sim.records.spool import OnDisk, Spool, in_order
+from sim.records.record_kinds import CODES, StoredTrace
+from sim.records.spool import Spool, in_order
 
 _KEY: Final = struct.Struct("<qHB")
 """The first bytes of a stored record and its sort key: instant, node, kind (`CODES`). A line of JSON follows."""
@@ -67,7 +67,7 @@ class RecordSpools:
         return StoredRecords(deliveries, others)
 
 
-class StoredRecords(OnDisk[Record]):
+class StoredRecords(StoredTrace):
     """Trace records on disk, sorted: one file of deliveries and one of other records, merged while they are read."""
 
     def __init__(self, deliveries: Spool, others: Spool) -> None:

@@ -18,8 +18,7 @@ import numpy as np
 
 from fanet_mw.trace import DELIVERED_LINE, Delivered, Record, line
 from sim.records.disk_backed_log import MOST_IN_MEMORY, MOST_PACKED_BYTES, DiskBackedLog
-from sim.records.record_kinds import CODES, KINDS, DeliveryColumns, in_columns
-from sim.records.spool import OnDisk
+from sim.records.record_kinds import CODES, KINDS, DeliveryColumns, StoredTrace, in_columns
 
 _DELIVERED: Final = CODES[Delivered]
 _IS_DELIVERED: Final = bytes(code == _DELIVERED for code in range(256))
@@ -34,7 +33,7 @@ Change = Callable[[Delivered], Delivered]
 """A function that corrects a delivery, such as its delay, which the receiver measured by its own clock."""
 
 
-class TraceLog(OnDisk[Record]):
+class TraceLog(StoredTrace):
     """The trace records of a run, in the order in which they were added."""
 
     def __init__(
@@ -85,7 +84,7 @@ class TraceLog(OnDisk[Record]):
 
     def delivery_columns(self) -> Iterator[DeliveryColumns]:
         if self._change is not None:
-            yield from in_columns(self.of_kinds((Delivered,)))  # type: ignore[arg-type]
+            yield from super().delivery_columns()
             return
         for _, packed, _ in self._portions():
             rows = np.frombuffer(packed, _COLUMNS)
@@ -94,7 +93,7 @@ class TraceLog(OnDisk[Record]):
 
     def lines(self) -> Iterator[bytes]:
         if self._change is not None:
-            yield from (f"{line(record)}\n".encode() for record in self)
+            yield from super().lines()
             return
         for codes, rows, others in self._portions():
             delivered, rest = iter(_lines(rows)), iter(_unpickled(others))

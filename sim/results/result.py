@@ -8,6 +8,7 @@ from typing import Any
 from fanet_mw.bus.link_stats import LOSSES, LinkRow
 from fanet_mw.trace import Delivered, Record, kind_of
 from fanet_mw.units import US, NodeId, S
+from sim.records.record_kinds import StoredTrace
 from sim.records.spool import OnDisk
 from sim.results.files import finish
 from sim.results.links import LinkTotals
@@ -57,7 +58,7 @@ class Result:
         )
 
 
-class FolderRecords(OnDisk[Record]):
+class FolderRecords(StoredTrace):
     """The trace of a folder; each iteration reads the file again."""
 
     def __init__(self, folder: RunFolder) -> None:

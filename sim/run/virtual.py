@@ -92,11 +92,6 @@ EPOCH_UNIX_NS: Final = 1_735_689_600 * S
 Applications = Callable[[int], Sequence[Application]]
 """A user's applications for each node."""
 
-
-def no_applications(_: int) -> Sequence[Application]:
-    return ()
-
-
 _STEP_NS: Final = 100 * MS
 """The time between two checks for signals. The result of a run does not depend on it."""
 
@@ -106,7 +101,7 @@ def actors_of(
     swarm: str,
     *,
     capture: Capture | None = None,
-    applications: Applications = no_applications,
+    applications: Applications = lambda _: (),
 ) -> list[Actor]:
     """All actors of a swarm: the world comes first, so that poses are known before any node transmits."""
     starts, onboard_map, reader = positions(scenario), map_on_board(scenario), Reader()
@@ -135,7 +130,7 @@ def simulate(
     on_progress: Callable[[float], None] = lambda _: None,
     capture: Capture | None = None,
     signals: Sequence[int] = (),
-    applications: Applications = no_applications,
+    applications: Applications = lambda _: (),
     spool_folder: Path | None = None,
     observer: Observer | None = None,
     on_failure: Callable[[BaseException, str], None] | None = None,
@@ -189,7 +184,7 @@ class Observed:
         scenario: Scenario,
         *,
         capture: Capture | None = None,
-        applications: Applications = no_applications,
+        applications: Applications = lambda _: (),
         folder: Path | None = None,
         observer: Observer | None = None,
     ) -> None:

@@ -4,16 +4,17 @@
     its answers and telemetry -> the air -> the post -> its tap -> gateway -> ground stations
 
 Commands have the priority of safety, plans and parameters that of reports, and telemetry that of bulk. Heartbeats of
-ground stations are told to all, and no more often than UAVs need them.
+ground stations are told to all, and no more often than UAVs need them; what no UAV understands stays on the ground.
 """
 
 from collections import Counter
 from collections.abc import Mapping
 from typing import Any, Final
 
+from agents.ground_control.application import OVER_AIR
 from fanet_mw.application import Application, Received
 from fanet_mw.errors import MalformedFrameError
-from fanet_mw.gateway.framing import Frame, frame_of, layout
+from fanet_mw.gateway.framing import frame_of, layout
 from fanet_mw.mavlink import AUTOPILOT_COMPONENT, common
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import BROADCAST, MS, NodeId, S
@@ -25,10 +26,16 @@ _MOST_PRESENT: Final = 8
 """Ground stations whose heartbeats are told in this time."""
 MOST_PER_S: Final = 40
 """Packets that operators may put on the air in a second; what is more must be said again."""
+_MOST: Final = {PRIORITY_SAFETY: MOST_PER_S, PRIORITY_REPORT: MOST_PER_S - 10}
+"""The same by priority: some are left for commands, however much a ground station asks."""
 _UNDER_WAY_NS: Final = 1_200 * MS
 _MOST_ASKED: Final = 500
 _LONGEST: Final = 900
 """Inner bytes of a packet; more frames for one UAV go in another."""
+_PASSED: Final = OVER_AIR - {common.MAVLINK_MSG_ID_SYSTEM_TIME}
+"""What UAVs act on or answer, and what no joystick, camera or base of GPS corrections says."""
+_TIMED: Final = frozenset({common.MAVLINK_MSG_ID_PING, common.MAVLINK_MSG_ID_TIMESYNC})
+"""Questions of how late it is: some ask all vehicles ten times a second, and each would answer each time."""
 URGENT: Final = frozenset({
     common.MAVLINK_MSG_ID_COMMAND_LONG, common.MAVLINK_MSG_ID_COMMAND_INT, common.MAVLINK_MSG_ID_SET_MODE,
     common.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED, common.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT,
@@ -45,7 +52,7 @@ ANSWERS: Final = frozenset({
     common.MAVLINK_MSG_ID_SYS_STATUS, common.MAVLINK_MSG_ID_GPS_RAW_INT, common.MAVLINK_MSG_ID_ATTITUDE,
     common.MAVLINK_MSG_ID_LOCAL_POSITION_NED, common.MAVLINK_MSG_ID_VFR_HUD, common.MAVLINK_MSG_ID_RADIO_STATUS,
     common.MAVLINK_MSG_ID_BATTERY_STATUS, common.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
-    common.MAVLINK_MSG_ID_SYSTEM_TIME,
+    common.MAVLINK_MSG_ID_SYSTEM_TIME, common.MAVLINK_MSG_ID_ADSB_VEHICLE,
 })  # fmt: skip
 """The messages with which a packet of a UAV to the post may begin."""
 
@@ -60,7 +67,7 @@ class OperatorRelay(Application):
         self._nodes = {system_id(node): NodeId(node) for node in scenario.uav_ids}
         self._told_ns: dict[int, int] = {}
         """When the heartbeat of each ground station was told, by its system; for `PRESENCE_NS`."""
-        self._asked: dict[tuple[int, int, int, bytes], int] = {}
+        self._asked: dict[bytes, int] = {}
         """When each question was put on the air last, the newest at the end."""
         self._second, self._in_second = -1, 0
         self._counts: Counter[str] = Counter()
@@ -77,27 +84,30 @@ class OperatorRelay(Application):
             if frame.message_id == common.MAVLINK_MSG_ID_HEARTBEAT:
                 self._presence(data, frame.system, now_ns)
                 continue
+            if frame.message_id not in _PASSED or (frame.message_id in _TIMED and not frame.target):
+                self._counts["not_over_air"] += 1
+                continue
             to = self._nodes.get(frame.target) if frame.target else BROADCAST
             if to is None:
                 self._counts["for_nobody_here"] += 1
                 continue
-            if frame.message_id not in URGENT and self._is_under_way(frame, now_ns):
+            if frame.message_id not in URGENT and self._is_under_way(data, now_ns):
                 self._counts["under_way"] += 1
                 continue
             priority = PRIORITY_SAFETY if frame.message_id in URGENT else PRIORITY_REPORT
             waiting = said.get((to, priority), b"")
             if waiting and len(waiting) + len(data) > _LONGEST:
-                self._send(waiting, to, priority, now_ns)
+                self._send(waiting, to, priority, now_ns, most=_MOST[priority])
                 waiting = b""
             said[to, priority] = waiting + data
         for (target, priority), together in said.items():
-            self._send(together, target, priority, now_ns)
+            self._send(together, target, priority, now_ns, most=_MOST[priority])
 
-    def _is_under_way(self, frame: Frame, now_ns: int) -> bool:
+    def _is_under_way(self, data: bytes, now_ns: int) -> bool:
         """True if the same was asked lately: ground stations ask again before an answer over several hops can come, and
         some take the second one for that to their next question.
         """
-        asked = frame.system, frame.component, frame.message_id, frame.data[10:-2]
+        asked = _question(data)
         last_ns = self._asked.get(asked)
         if last_ns is not None and now_ns - last_ns < _UNDER_WAY_NS:
             return True
@@ -111,15 +121,17 @@ class OperatorRelay(Application):
         self._told_ns = {of: told_ns for of, told_ns in self._told_ns.items() if now_ns - told_ns < PRESENCE_NS}
         if system not in self._told_ns and len(self._told_ns) < _MOST_PRESENT:
             self._told_ns[system] = now_ns
-            self._send(data, BROADCAST, PRIORITY_REPORT, now_ns)
+            self._send(data, BROADCAST, PRIORITY_REPORT, now_ns, most=MOST_PER_S)
 
-    def _send(self, together: bytes, to: int, priority: int, now_ns: int) -> None:
+    def _send(self, together: bytes, to: int, priority: int, now_ns: int, *, most: int) -> None:
         if now_ns // S != self._second:
             self._second, self._in_second = now_ns // S, 0
-        self._in_second += 1
-        if self._in_second > MOST_PER_S:
+        if self._in_second >= most:
             self._counts["too_many"] += 1
+            for data in frames(together):
+                self._asked.pop(_question(data), None)
             return
+        self._in_second += 1
         self._counts["sent"] += 1
         self.port.send(together, destination=to, priority=priority)
 
@@ -137,3 +149,10 @@ class OperatorRelay(Application):
 
     def report(self) -> Mapping[str, Any]:
         return {f"operator_{name}": count for name, count in sorted(self._counts.items())}
+
+
+def _question(data: bytes) -> bytes:
+    """What a frame asks, and who does: all but its number and its CRC, and no time of a question of time."""
+    message_id = int.from_bytes(data[7:10], "little")
+    shape = layout(message_id) if message_id in _TIMED else None
+    return data[5:-2] if shape is None else data[5:10] + bytes((frame_of(data, shape).target,))

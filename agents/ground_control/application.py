@@ -46,7 +46,7 @@ _TRIES_NS: Final = 120 * S
 """After so long without a refusal telemetry is sent twice as often, down to the interval that leaves the air room."""
 _WATCHED_NS: Final = 10 * S
 """Telemetry over the air ends when the gateway has not been heard for so long."""
-_OVER_AIR: Final = frozenset({
+OVER_AIR: Final = frozenset({
     common.MAVLINK_MSG_ID_HEARTBEAT, common.MAVLINK_MSG_ID_SYSTEM_TIME, common.MAVLINK_MSG_ID_COMMAND_LONG,
     common.MAVLINK_MSG_ID_COMMAND_INT, common.MAVLINK_MSG_ID_SET_MODE, common.MAVLINK_MSG_ID_MISSION_SET_CURRENT,
     common.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED, common.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT,
@@ -116,7 +116,7 @@ class GroundControl(Application):
         self._on_mission_key = on_mission_key
         self._node, self._streams = node, streams
         self._post = scenario.post
-        self.listens = _OVER_AIR if scenario.post is not None else ()
+        self.listens = OVER_AIR if scenario.post is not None else ()
         self._least_pace_ns = self._pace_ns = pace_of(scenario).interval_ns
         self._slowed_ns = 0
         """The instant at which telemetry was last refused, or made faster since."""

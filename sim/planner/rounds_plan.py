@@ -14,7 +14,7 @@ from fanet_mw.graph.topology import Adjacency, dominates, levels, two_hop, withi
 from fanet_mw.routing.rounds.bulk_slots import SELDOM
 from fanet_mw.routing.rounds.delay_law import DelayLaw
 from fanet_mw.routing.rounds.round_timing import RoundTiming
-from fanet_mw.scenario import Scenario
+from fanet_mw.scenario import Scenario, Traffic
 from fanet_mw.units import MS, Enu, NodeId, S
 from fanet_mw.wire import PRIORITY_REPORT
 from sim.planner.plan_text import describe_operator, item
@@ -41,28 +41,28 @@ def judge_rounds(
     near = within_range(at, range_m=scenario.radio.range_m, reaches=scenario.reaches)
     ways = [levels(near, node) for node in at]
     hops = max(max(hops_to.values()) for hops_to in ways)
-    urgent = {
-        name: each for name, each in scenario.traffic_classes.items() if each.priority != "bulk" or not timing.slots
-    }
+    endless = [name for name, each in scenario.traffic_classes.items() if each.arrivals == "saturated"]
+    counted = {name: each for name, each in scenario.traffic_classes.items() if name not in endless}
+    urgent = {name: each for name, each in counted.items() if each.priority != "bulk" or not timing.slots}
     packets = [  # how many a second, and how long they are
-        (len(sources_of(scenario, name)) / each.interval_s, each.longest_bytes) for name, each in urgent.items()
+        (len(sources_of(scenario, name)) * _most_hz(each), each.longest_bytes) for name, each in urgent.items()
     ]
     offered = sum(rate * size for rate, size in packets)
     used = sum(rate * law.turns_of(size) for rate, size in packets) * timing.period_ns / S
     longest = max((size for _, size in packets), default=0)
     bound_ns = None if law.loses_frames else law.over_ns(hops, longest_bytes=longest, used=used)
     carried = timing.turn_bytes / (timing.period_ns / S)
-    bulk = {name: each for name, each in scenario.traffic_classes.items() if name not in urgent}
+    bulk = {name: each for name, each in counted.items() if name not in urgent}
     flooded = [name for name, each in bulk.items() if each.destination == "all"]
     rates: dict[NodeId, float] = defaultdict(float)
     for name in flooded:
         for node in sources_of(scenario, name):
-            rates[NodeId(node)] += 1 / bulk[name].interval_s
+            rates[NodeId(node)] += _most_hz(bulk[name])
     load = None
     if flooded:
         longest_bulk = max(bulk[name].longest_bytes for name in flooded)
         load = greatest_load(near, rates, timing, longest_bytes=longest_bulk)
-    problems = list[str]()
+    problems = [f"{name}: saturated sources offer more than any turns or slots carry" for name in endless]
     if load is not None and load.needed > _LEFT_OUT * load.carried:
         problems.append(
             f"bulk: node {load.node} has {load.needed:.0f} packets a second to send, and its slots carry "
@@ -107,6 +107,11 @@ def judge_rounds(
         text.append(item("operator", operator))
         content["operator"] = operator
     return "\n".join(text), content, feasible
+
+
+def _most_hz(traffic: Traffic) -> float:
+    """Packets a second of one source while it is active."""
+    return 1 / traffic.interval_s if traffic.arrivals == "on_off" else traffic.source_hz
 
 
 def _too_long(scenario: Scenario, bound_ns: int | None) -> Iterator[str]:

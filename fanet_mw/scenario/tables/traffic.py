@@ -57,14 +57,19 @@ class Traffic(Section):
         """The size of the longest packet."""
         return max((size for _, size in self.packets), default=self.payload_bytes)
 
+    @property
+    def source_hz(self) -> float:
+        """The packets a second that one source makes on average."""
+        if self.arrivals == "trace":
+            return len(self.packets) / max(max(at_s for at_s, _ in self.packets), self.interval_s)
+        active = {"on_off": self.on_s / (self.on_s + self.off_s), "saturated": math.inf, "none": 0.0}
+        return active.get(self.arrivals, 1.0) / self.interval_s
+
     def rate_hz(self, nodes: int) -> float:
         """The packets a second that all sources in a swarm of so many nodes make on average."""
         named = self.sources if not isinstance(self.sources, tuple) else len(self.sources)
         sources = nodes if isinstance(named, str) else named
-        if self.arrivals == "trace":
-            return sources * len(self.packets) / max(max(at_s for at_s, _ in self.packets), self.interval_s)
-        active = {"on_off": self.on_s / (self.on_s + self.off_s), "saturated": math.inf, "none": 0.0}
-        return sources * active.get(self.arrivals, 1.0) / self.interval_s if sources else 0.0
+        return sources * self.source_hz if sources else 0.0
 
     @model_validator(mode="after")
     def _trace_has_packets(self) -> Self:

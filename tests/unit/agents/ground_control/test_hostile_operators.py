@@ -33,7 +33,7 @@ def hostile(random_: random.Random) -> bytes:
     number = random_.choice(UNDERSTOOD if random_.random() < 0.9 else KNOWN)
     shape = layout(number)
     assert shape is not None
-    payload = bytearray(random_.randbytes(shape.length))
+    payload = bytearray(random_.randbytes(common.mavlink_map[number].unpacker.size))
     if random_.random() < 0.5:  # floats that are odd, and fields that make sense
         odd = random_.choice([math.nan, math.inf, -math.inf, 0.0, 1.0, -1.0, 1e30, 20.0])
         for at in range(0, len(payload) - 3, 4):

@@ -177,8 +177,10 @@ class Announcing:
         the one announced: another UAV may pass the survivor without knowing.
         """
         known = self._survivors.by_id[survivor]
+        if self._node not in known.reporters:
+            return False  # before its own estimate, which costs the most, is asked for
         own = known.own_place()
-        if own is None or own.is_vague or self._node not in known.reporters:
+        if own is None or own.is_vague:
             return False
         return known.announced is None or own.sigma_m <= _IMPROVEMENT * estimate_of(known.announced).sigma_m
 

@@ -76,24 +76,32 @@ _STILL_M_S: Final = 0.4
 """What climbs or sinks faster than that does not stand; the noise of GPS velocities is a tenth of it."""
 _FIXES: Final = 10
 """A UAV that is in the air from the start is compared with its start for so many fixes."""
+_SIGMAS: Final = 6.0
+_LEAST_M: Final = 5.0
+"""A UAV that is farther from its start than this, and than so many standard deviations of GPS, has flown before: its
+computer has started again.
+"""
 
 
 class HeightReference:
     """GPS's error in height, learned where the UAV starts: the height is known there, and the error lasts."""
 
-    def __init__(self, start_m: float) -> None:
-        self._start_m = start_m
+    def __init__(self, start: Enu, *, sigma_m: float, sigma_up_m: float) -> None:
+        self._start = start
+        self._most_m, self._most_up_m = max(_LEAST_M, _SIGMAS * sigma_m), max(_LEAST_M, _SIGMAS * sigma_up_m)
         self._off_m = 0.0
         self._count = 0
         self._has_flown = False
 
     def off_m(self, fix: Gps, *, stands: bool) -> float:
         """The error, after another fix; `stands`: the UAV is not known to have taken off."""
+        apart = fix.position.minus(self._start)
         moves = abs(fix.velocity.up) > _STILL_M_S
+        moves |= apart.horizontal() > self._most_m or abs(apart.up) > self._most_up_m
         self._has_flown |= moves or (not stands and self._count >= _FIXES)
         if not self._has_flown:
             self._count += 1
-            self._off_m += max(_WEIGHT, 1 / self._count) * (fix.position.up - self._start_m - self._off_m)
+            self._off_m += max(_WEIGHT, 1 / self._count) * (apart.up - self._off_m)
         return self._off_m
 
 
@@ -143,7 +151,9 @@ class GroundControl(Application):
         pilot.position = position
         pilot.mission.on_reached = self._on_reached
         self._ground = Ground(origin, home.up)
-        self._height = HeightReference(position.up)
+        sensors = scenario.sensors
+        sigma_m = math.hypot(sensors.gps_common_m, sensors.gps_bias_m, scenario.world.gps_sigma_m)
+        self._height = HeightReference(position, sigma_m=sigma_m, sigma_up_m=sensors.gps_vertical * sigma_m)
         self._transfer = PlanTransfer(self._reply, check=self._check, accept=self._accept)
         self._commands = Commands(
             pilot, streams, lambda: self._ground, reply=self._reply, send=self._send, one=self._one,

@@ -868,3 +868,18 @@ def test_a_receiver_that_gives_no_more_fixes_has_none() -> None:
     assert fix_type() == 3
     bench.now_ns += 10 * S
     assert fix_type() == 1
+
+
+@pytest.mark.parametrize("on_ground", [True, False])
+@pytest.mark.parametrize("place", [Enu(300, 0, 22), Enu(5, 0, 95)])
+def test_a_computer_that_starts_again_in_flight_takes_no_height_for_an_error_of_gps(
+    place: Enu, *, on_ground: bool
+) -> None:
+    start = Enu(0, 0, 0 if on_ground else 20)
+    bench = Bench(scenario(nodes={"count": 2, "on_ground": on_ground, "altitude_m": 20}), at=start)
+    bench.position = place
+    bench.run(10)
+    assert not bench.flown.on_ground
+    assert bench.flown.armed
+    bench.command(common.MAV_CMD_REQUEST_MESSAGE, common.MAVLINK_MSG_ID_LOCAL_POSITION_NED)
+    assert bench.told("LOCAL_POSITION_NED")[-1].z == pytest.approx(-place.up, abs=0.1)

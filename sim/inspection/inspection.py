@@ -6,7 +6,8 @@ from typing import Any, Final, NamedTuple
 from fanet_mw import tlog
 from fanet_mw.bus.link_stats import LOSSES, LinkStats
 from fanet_mw.bus.messages import Poses
-from fanet_mw.errors import MalformedFrameError
+from fanet_mw.errors import ConfigError, MalformedFrameError
+from fanet_mw.foreign_file import open_regular
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record
 from fanet_mw.units import US, S
@@ -86,12 +87,13 @@ def of_folder(folder: RunFolder) -> Inspection:
     found.now_ns = round(folder.summary["simulated_s"] * S)
     epoch_ns = folder.summary.get("epoch_unix_ns", 0)
     try:
-        for t_us, frame in tlog.read(folder.folder / TLOG_FILE):
-            node = node_of_system(frame[5], nodes=folder.scenario.node_count)
-            found.take_tap(node, t_us * US - epoch_ns, frame)
+        with open_regular(folder.folder / TLOG_FILE, follow=False) as log:
+            for t_us, frame in tlog.read_from(log, source=TLOG_FILE):
+                node = node_of_system(frame[5], nodes=folder.scenario.node_count)
+                found.take_tap(node, t_us * US - epoch_ns, frame)
     except MalformedFrameError:
         found.messages.malformed += 1
-    except OSError:
+    except ConfigError:
         pass  # a run without telemetry has no such file
     found.take_records(folder.records())
     for node, report in folder.agents().items():

@@ -41,7 +41,10 @@ class Task:
         """The resolved value of a dotted scenario key; None if the scenario leaves it unset."""
         at: object = self.tree
         for part in key.split("."):
-            at = at.get(part) if isinstance(at, Mapping) else None
+            if isinstance(at, Sequence) and not isinstance(at, str):
+                at = dict(enumerate(at)).get(int(part)) if part.isdecimal() else None
+            else:
+                at = at.get(part) if isinstance(at, Mapping) else None
         return at
 
 

@@ -3,6 +3,7 @@
 import contextlib
 import os
 import pty
+import shutil
 import subprocess
 import sys
 import time
@@ -155,6 +156,18 @@ def test_the_messages_of_a_folder_have_instants_of_the_swarm(folder: Path) -> No
     (first_us, _), *_ = run.telemetry()
     since = min(stream.first_ns for stream in of_folder(run).messages.streams.values())
     assert since == first_us * US - run.summary["epoch_unix_ns"] > 0
+
+
+def test_a_log_that_is_no_file_is_not_waited_for(folder: Path, tmp_path: Path) -> None:
+    copy = Path(shutil.copytree(folder, tmp_path / "run"))
+    log = copy / "mavlink.tlog"
+    whole = log.read_bytes()
+    log.write_bytes(whole[:-1])
+    cut = of_folder(RunFolder(copy)).messages
+    assert (cut.malformed, cut.count) == (1, of_folder(RunFolder(folder)).messages.count - 1)
+    log.unlink()
+    os.mkfifo(log)
+    assert of_folder(RunFolder(copy)).messages.count == 0
 
 
 def test_links_that_carry_nothing_any_more_are_shown_no_more() -> None:

@@ -70,6 +70,13 @@ def test_the_columns_of_a_table_are_the_keys_that_vary() -> None:
     assert varied == ["routing.protocol", "traffic.sources", "nodes.count", "routing.gossip_p"]
 
 
+def test_an_axis_may_be_a_key_of_one_of_several_tables() -> None:
+    text = 'base = "quick"\nset.traffic = [{name = "a"}, {name = "b"}]\ngrid."traffic.1.interval_s" = [2, 4]'
+    tasks = tasks_of(spec.parse(text, source="test"))
+    assert [task.value("traffic.1.interval_s") for task in tasks] == [2, 4]
+    assert tasks[0].value("traffic.2.interval_s") is None
+
+
 def test_the_command_of_a_run_names_every_change_and_the_seed() -> None:
     task = tasks_of(spec.parse(FILE, source="test"))[-1]
     assert task.command == (

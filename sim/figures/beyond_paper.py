@@ -2,6 +2,7 @@
 positions.
 """
 
+import json
 from typing import Final
 
 from sim.figures.curves import P95, PAPERS, PDR, Panel, curves
@@ -15,8 +16,9 @@ _RIVALS: Final = ("paper", "flooding", CONTROL, "gossip", "counter")
 
 def _ms_per_delivery(row: Row) -> float | None:
     """The busy time of the channel at a mean station, per packet delivered to it [ms]."""
-    per_node = row["delivered"] / row["nodes"]
-    return row["air.busy"] * row["duration_s"] * 1e3 / per_node if per_node else None
+    per_node, scenario = row["delivered"] / row["nodes"], json.loads(row["scenario"])
+    measured_s = scenario["duration_s"] - scenario["warmup_s"] - scenario["drain_s"]
+    return row["air.busy"] * measured_s * 1e3 / per_node if per_node else None
 
 
 def _load_claims(runs: Runs) -> list[Claim]:

@@ -31,7 +31,7 @@ class Runs:
     def __init__(self, table: Table) -> None:
         if missing := {"status", "seed", "code"} - {*table.column_names}:
             raise ConfigError(f"the table has no column {', '.join(sorted(missing))}, so it is not of a sweep")
-        rows = table.drop_columns([name for name in ("scenario", "summary") if name in table.column_names]).to_pylist()
+        rows = table.drop_columns([name for name in ("summary",) if name in table.column_names]).to_pylist()
         self.rows: list[Row] = [row for row in rows if row["status"] == "ok"]
         self.failed = len(rows) - len(self.rows)
 

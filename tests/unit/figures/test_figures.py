@@ -15,7 +15,7 @@ import pytest
 from emulator.pcap_file import PcapFile
 from fanet_mw.errors import ConfigError
 from sim.cli.app import app
-from sim.figures import figure11
+from sim.figures import beyond_paper, figure11
 from sim.figures.all_figures import FIGURES, chosen
 from sim.figures.finished_runs import Runs, differences, keep, max_per_seed, mean_per_seed, read_kept
 from sim.figures.paper_claims import Claim, Finding, Reason, Statement, Verdict, above, alike, below
@@ -328,6 +328,21 @@ def test_the_interval_of_a_difference_holds_its_mean_on_either_side_of_0() -> No
     assert claim.verdict is Verdict.AGREES
     within = claim.statements[1].interval
     assert within.low <= within.mean <= within.high < 0
+
+
+def test_the_air_that_a_delivery_takes_does_not_depend_on_how_long_the_swarm_warms_up() -> None:
+    """A packet of 1024 B at 11 Mb/s takes 1 ms of air, and each of two nodes within reach sends it once: for two
+    packets one is delivered to the mean node, which has heard or sent four frames.
+    """
+    found = []
+    for warmup_s in (1, 5):
+        length = {"duration_s": warmup_s + 4, "warmup_s": warmup_s, "drain_s": 1}
+        sweep = spec.Sweep(base="flooding", set={**length, "nodes.count": 2, "traffic.sources": 1})
+        sweep = sweep.model_copy(update={"set": {**sweep.set, "traffic.interval_s": 0.02}})
+        rows = [(task, carry_out(task)) for task in tasks_of(sweep)]
+        (row,) = Runs(table_of(rows, sweep.varied())).rows
+        found.append(beyond_paper._ms_per_delivery(row))
+    assert found == pytest.approx([4.0, 4.0], rel=0.1)
 
 
 def test_failed_runs_are_in_no_figure(nine) -> None:

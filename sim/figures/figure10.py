@@ -181,7 +181,7 @@ def _short_slots_meet(runs: Runs) -> Reason:
         "flood lasts, so that floods of heads that follow each other meet.",
         [
             above(f"{where}: PDR with 1 s and more minus with less", seldom, 0.0),
-            above(f"{where}: mean time of a packet on the air", on_the_air_ms, slot_ms, "ms"),
+            above(f"{where}: mean time from a packet's first frame to its receipt", on_the_air_ms, slot_ms, "ms"),
         ],
     )
 

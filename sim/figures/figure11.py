@@ -123,7 +123,7 @@ def _flooding_is_faster_on_average(runs: Runs) -> Claim:
 
     slots = Reason(
         "A flooded packet is relayed at once; under the paper's method it waits for its head's slot first.",
-        [above("wait at nodes, the paper's method minus flooding", longer("delay_parts_ms.queue"), 0.0, "ms")],
+        [above("wait at the origin, the paper's method minus flooding", longer("delay_parts_ms.queue"), 0.0, "ms")],
     )
     return Claim(
         11,
@@ -143,7 +143,7 @@ def _flooding_has_a_tail(runs: Runs) -> Claim:
         [
             share_below("flooding: delivery ratio", flooded("pdr"), _MOST),
             below("flooding: longest delay", flooded("delay_ms.max"), _WITHIN_S * 1e3, "ms"),
-            below("flooding: wait at nodes", flooded("delay_parts_ms.queue"), 1.0, "ms"),
+            below("flooding: wait at the origin", flooded("delay_parts_ms.queue"), 1.0, "ms"),
         ],
     )
     tail = [1 - share for share in flooded(_OF_DELIVERIES).values()]

@@ -73,7 +73,7 @@ def _heard(row: Row) -> float:
 
 def _half_s(row: Row) -> float | None:
     """The instant by which half of the swarm has changed course; None if it never has."""
-    times, half = sorted(_times(row)), int(row["nodes"]) // 2
+    times, half = sorted(_times(row)), math.ceil(row["nodes"] / 2)
     return times[half - 1] if len(times) >= half else None
 
 

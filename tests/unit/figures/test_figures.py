@@ -15,7 +15,7 @@ import pytest
 from emulator.pcap_file import PcapFile
 from fanet_mw.errors import ConfigError
 from sim.cli.app import app
-from sim.figures import beyond_paper, figure11
+from sim.figures import beyond_paper, figure11, figure12
 from sim.figures.all_figures import FIGURES, chosen
 from sim.figures.finished_runs import Runs, differences, keep, max_per_seed, mean_per_seed, read_kept
 from sim.figures.paper_claims import Claim, Finding, Reason, Statement, Verdict, above, alike, below
@@ -218,6 +218,12 @@ def test_a_search_that_did_not_confirm_so_many_ended_with_the_run() -> None:
     assert confirmed_s({**row, "mission.time_to_confirm_s": None}, 0.5) == 80
     assert loss_share('[{at_s = 0.0, kind = "degrade", loss_db = 0.0, loss_share = 0.8}]') == 0.8
     assert loss_share("[]") == 0
+
+
+def test_half_of_an_odd_swarm_is_more_than_half_of_it_less_one() -> None:
+    row = {"nodes": 5.0, "first_approach_s": [4.0, 1.0, 3.0]}
+    assert figure12._half_s(row) == 4
+    assert figure12._half_s({**row, "first_approach_s": [1.0, 3.0]}) is None
 
 
 def test_a_figure_that_there_is_not_is_an_error() -> None:

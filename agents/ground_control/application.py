@@ -486,7 +486,7 @@ class GroundControl(Application):
             if flies:
                 pilot.hold()
         elif kind is Kind.FENCE:
-            pilot.fence = fence_of(items, self._ground)
+            pilot.take_fence(fence_of(items, self._ground))
         else:
             pilot.rally = rally_of(items, self._ground)
 

@@ -30,6 +30,8 @@ flight controller may still be busy with earlier commands.
 """
 _OVER_M: Final = 3.0
 """A landing begins within this distance of its place."""
+_INSIDE_M: Final = 3.0
+"""This far from the edge of a fence a UAV is well inside."""
 _UP_M: Final = 2.5
 """A UAV this high above the place where it stood has taken off."""
 _BRAKE_M_S: Final = 5.0
@@ -74,6 +76,8 @@ class Pilot:
         """True once it has commanded anything."""
         self._ground_m = home.up
         self.beyond = False
+        self._left_fence = False
+        """True from when it leaves the fence until it is well inside."""
 
     @property
     def commands(self) -> bool:
@@ -232,6 +236,15 @@ class Pilot:
         self._say(_WARNING, "Operator lost: " + ("holding", "returning", "landing")[action - 1])
         (self.hold, self.go_home, self.land)[action - 1]()
 
+    @property
+    def _well_inside(self) -> bool:
+        here = self.position
+        around = ((math.sin(turn), math.cos(turn)) for turn in (math.tau * eighth / 8 for eighth in range(8)))
+        return all(
+            allowed(self.fence, here._replace(east=here.east + _INSIDE_M * east, north=here.north + _INSIDE_M * north))
+            for east, north in around
+        )
+
     # --- how it is done -------------------------------------------------------------------------------------------
 
     def _enter(self, mode: Mode, course: Course | None) -> None:
@@ -330,15 +343,21 @@ class Pilot:
             self.mode = Mode.HOLD
             self._say(_NOTICE, "Landed and disarmed")
 
+    def take_fence(self, areas: tuple[Area, ...]) -> None:
+        self.fence, self._left_fence = areas, False
+
     def _watch_fence(self) -> None:
-        inside = allowed(self.fence, self.position)
-        if inside or self.beyond:
-            self.beyond = not inside
+        """Act once the UAV has left the fence, and not again before it is well inside: fixes at its edge are noisy."""
+        self.beyond = not allowed(self.fence, self.position)
+        if self._left_fence or not self.beyond:
+            self._left_fence = self._left_fence and not self._well_inside
             return
-        self.beyond = True
+        self._left_fence = True
         action = round(self.settings[names.FENCE_ACTION])
         if action == 0:
             return
+        if self.mode is Mode.LAND or (self.mode is Mode.RETURN and action in (2, 3)):
+            action = 1  # it does as much already
         self._say(
             _WARNING - 2, "Beyond the geofence" + {2: ": holding", 3: ": returning", 5: ": landing"}.get(action, "")
         )

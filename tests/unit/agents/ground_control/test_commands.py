@@ -9,6 +9,7 @@ from operator_bench import GCS, LAT, LON, Bench, degrees, scenario
 from agents.ground_control.settings import settings_of
 from fanet_mw import mavlink
 from fanet_mw.application import Course, Fate, Received, Status
+from fanet_mw.bus.messages import Gps
 from fanet_mw.flavors import Mode, number_of
 from fanet_mw.mavlink import Geodetic, common
 from fanet_mw.units import STILL, Enu, NodeId, S
@@ -883,3 +884,54 @@ def test_a_computer_that_starts_again_in_flight_takes_no_height_for_an_error_of_
     assert bench.flown.armed
     bench.command(common.MAV_CMD_REQUEST_MESSAGE, common.MAVLINK_MSG_ID_LOCAL_POSITION_NED)
     assert bench.told("LOCAL_POSITION_NED")[-1].z == pytest.approx(-place.up, abs=0.1)
+
+
+def fenced(bench: Bench) -> Bench:
+    corners = [degrees(east, north) for east, north in ((-50, -50), (50, -50), (50, 50), (-50, 50))]
+    assert upload(bench, [(0, 5001, x, y, 0.0, (4, 0, 0, 0)) for x, y in corners], kind=1) == ACCEPTED
+    return bench
+
+
+def fixes(bench: Bench, *east_m: float) -> None:
+    """Positions along a line to the east, as the receiver has them."""
+    for east in east_m:
+        bench.now_ns += S // 5
+        bench.control.on_fix(Gps(bench.now_ns, Enu(east, 0, 20), Enu(0, 0, 0)), bench.now_ns)
+
+
+@pytest.mark.parametrize(("number", "mode"), [(HOME, Mode.RETURN), (LAND, Mode.LAND), (REPOSITION, Mode.HOLD)])
+def test_who_holds_at_the_edge_of_a_fence_may_leave_it_whatever_the_noise_of_fixes(number: int, mode: Mode) -> None:
+    bench = fenced(Bench().airborne())
+    fixes(bench, 49, 51)
+    assert bench.flown.mode is Mode.HOLD
+    fixes(bench, 49.8, 50.1, 49.9)
+    lat, lon = degrees(0, 0)
+    assert bench.command(number, -1, 1, 0, math.nan, lat / 1e7, lon / 1e7, 20) == ACCEPTED
+    flown = len(bench.courses)
+    fixes(bench, 50.1, 49.9, 50.2, 49.5, 50.1)
+    assert bench.flown.mode is mode
+    assert len(bench.courses) == flown
+    fixes(bench, 40)
+    assert not bench.flown.beyond
+    if mode is Mode.HOLD:
+        fixes(bench, 51)
+        assert len(bench.courses) > flown, "whoever was inside and leaves again holds again"
+
+
+@pytest.mark.parametrize(("action", "mode"), [(2, Mode.RETURN), (3, Mode.RETURN), (5, Mode.LAND)])
+def test_a_return_across_a_fence_is_no_less_than_what_the_fence_asks_for(action: int, mode: Mode) -> None:
+    bench = fenced(Bench().airborne())
+    bench.say(common.MAVLink_param_set_message(1, 1, b"GF_ACTION", float(action), 9))
+    fixes(bench, 40)
+    bench.command(HOME)
+    fixes(bench, 51)
+    assert bench.flown.mode is mode
+
+
+def test_another_fence_is_looked_at_anew() -> None:
+    bench = fenced(Bench().airborne())
+    fixes(bench, 49, 51)
+    told = len(bench.told("STATUSTEXT"))
+    fenced(bench)
+    fixes(bench, 51)
+    assert len(bench.told("STATUSTEXT")) == told + 1

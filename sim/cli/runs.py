@@ -45,8 +45,10 @@ def simulate(
     """
     from fanet_mw.scenario.fingerprint import modules_of
     from sim.cli.foreign_parts import in_own_process
+    from sim.world.possible_world import require_possible
 
     chosen = choice.scenario(scenario)
+    require_possible(chosen)  # before the result of another run gives way
     parts = modules_of(chosen)
     return in_own_process(partial(_simulate, chosen, output), parts) if parts else _simulate(chosen, output)
 
@@ -131,27 +133,30 @@ def launch(
     from sim.results.files import begun
     from sim.run.launcher.leads import fitted
     from sim.run.launcher.swarm import launch as run
+    from sim.world.possible_world import require_possible
 
     chosen = choice.realtime_scenario(scenario) if no_world else choice.scenario(scenario)
     name = Topics(swarm or chosen.name).swarm
+    # what is wrong is said before the result of another run gives way
+    require_possible(chosen)
+    doors.doors()
+    beside = [] if output.record is None else [["record", str(output.record.absolute()), "--quiet"]]
+    if view or view_port is not None:
+        import viser  # noqa: F401
+
+        beside.append(["view", "--until-gone", *([] if view_port is None else ["--port", str(view_port)])])
+    if (words := doors.command()) is not None:
+        beside.append(words)
+    if autopilots is not None:
+        if not no_world:
+            raise ConfigError("--autopilots: needs --no-world, because flight controllers are the world then")
+        beside.append(["autopilots", autopilots, "--flavor", doors.flavor])
     with output.prepared():
-        doors.doors()
         # another's world has the scenario as it is
         chosen, leads = (chosen, None) if no_world else fitted(chosen, _say)
         print_notes(chosen)
         warn_of(listen, listens=True)
         warn_of(connect, listens=False)
-        beside = [] if output.record is None else [["record", str(output.record.absolute()), "--quiet"]]
-        if view or view_port is not None:
-            import viser  # noqa: F401  what is missing is said before the run
-
-            beside.append(["view", "--until-gone", *([] if view_port is None else ["--port", str(view_port)])])
-        if (words := doors.command()) is not None:
-            beside.append(words)
-        if autopilots is not None:
-            if not no_world:
-                raise ConfigError("--autopilots: needs --no-world, because flight controllers are the world then")
-            beside.append(["autopilots", autopilots, "--flavor", doors.flavor])
         with (
             own_output(json=output.json),
             begun(output.out),

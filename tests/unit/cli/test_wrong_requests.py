@@ -91,6 +91,21 @@ def test_an_option_whose_value_is_empty_is_refused(words: list[str]) -> None:
     require_values(["simulate", "quick", "--out", ".", "--set", "world.heightmap=", "--set=world.heightmap=", "--json"])
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("launch quick --autopilots udpin:127.0.0.1:14540+", "--autopilots: needs --no-world"),
+        ("launch quick --mavlink bogus", "--mavlink bogus: must be"),
+        ("launch quick --set world.no_fly_m=[[0,0,500]]", "node 1 starts within it"),
+        ("simulate quick --set world.no_fly_m=[[0,0,500]]", "node 1 starts within it"),
+    ],
+)
+def test_a_refused_request_costs_no_result_that_it_was_to_replace(words: str, said: str, tmp_path: Path) -> None:
+    (tmp_path / "summary.json").write_text("{}")
+    assert said in refusal(*words.split(), "--out", str(tmp_path), "--force")
+    assert (tmp_path / "summary.json").read_text() == "{}"
+
+
 def test_a_folder_for_the_dialect_that_cannot_be_made_is_no_fault_of_pymavlink() -> None:
     assert refusal("dialect", "/proc/nowhere") == "/proc/nowhere/v1.0: cannot be written: No such file or directory"
 

@@ -92,13 +92,16 @@ class HeightReference:
         self._off_m = 0.0
         self._count = 0
         self._has_flown = False
+        self.begins_in_flight = False
+        """True at a first fix that is far from the start: the computer has started again in flight."""
 
     def off_m(self, fix: Gps, *, stands: bool) -> float:
         """The error, after another fix; `stands`: the UAV is not known to have taken off."""
         apart = fix.position.minus(self._start)
         moves = abs(fix.velocity.up) > _STILL_M_S
-        moves |= apart.horizontal() > self._most_m or abs(apart.up) > self._most_up_m
-        self._has_flown |= moves or (not stands and self._count >= _FIXES)
+        far = apart.horizontal() > self._most_m or abs(apart.up) > self._most_up_m
+        self.begins_in_flight = far and not self._count and not self._has_flown
+        self._has_flown |= moves or far or (not stands and self._count >= _FIXES)
         if not self._has_flown:
             self._count += 1
             self._off_m += max(_WEIGHT, 1 / self._count) * (apart.up - self._off_m)
@@ -238,6 +241,8 @@ class GroundControl(Application):
 
     def on_fix(self, fix: Gps, now_ns: int) -> None:
         off_m = self._height.off_m(fix, stands=self._pilot.on_ground)
+        if self._height.begins_in_flight:
+            self._pilot.took_off()
         self._streams.height_off_m = off_m
         self._pilot.on_fix(fix.position._replace(up=fix.position.up - off_m), fix.velocity, now_ns)
         if self._watched_ns is not None or self._pilot.on_ground is not self._streams.flown.on_ground:

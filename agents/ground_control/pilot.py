@@ -33,7 +33,10 @@ _OVER_M: Final = 3.0
 _INSIDE_M: Final = 3.0
 """This far from the edge of a fence a UAV is well inside."""
 _UP_M: Final = 2.5
-"""A UAV this high above the place where it stood has taken off."""
+"""A UAV that climbs, and is this high above the place where it stood, has taken off."""
+_CLIMBS_M_S: Final = 0.4
+_DRIFTS: Final = 0.1
+"""While it stands, the height of its place follows what its instruments say, by this share of the difference."""
 _BRAKE_M_S: Final = 5.0
 _LOWEST_M: Final = 5.0
 """No simulated flight controller flies to a place below this height, or above the other, over the origin."""
@@ -207,8 +210,10 @@ class Pilot:
 
     def on_fix(self, position: Enu, velocity: Enu, now_ns: int) -> None:
         self.position, self.velocity = position, velocity
-        if self.on_ground and position.up > self._ground_m + _UP_M:
-            self.on_ground, self.armed = False, True  # the swarm's own task may have taken off
+        if self.on_ground and abs(velocity.up) <= _CLIMBS_M_S:
+            self._ground_m += _DRIFTS * (position.up - self._ground_m)
+        elif self.on_ground and position.up > self._ground_m + _UP_M:
+            self.took_off()  # the swarm's own task may have done so
         if self.mode is Mode.MISSION and not self.mission.idle:
             self._fly_step(now_ns)
         if self.on_ground:
@@ -226,6 +231,9 @@ class Pilot:
                 self._say(_WARNING, "No more setpoints: holding")
                 self.hold()
         self._watch_fence()
+
+    def took_off(self) -> None:
+        self.on_ground, self.armed = False, True
 
     def silent(self) -> None:
         if not self.commands or self.on_ground:

@@ -935,3 +935,28 @@ def test_another_fence_is_looked_at_anew() -> None:
     fenced(bench)
     fixes(bench, 51)
     assert len(bench.told("STATUSTEXT")) == told + 1
+
+
+@pytest.mark.parametrize("drift_m", [0.01, -0.01])
+def test_a_barometer_that_drifts_lets_nobody_who_has_landed_take_off(drift_m: float) -> None:
+    bench = Bench().airborne()
+    bench.command(LAND)
+    bench.run(20 / 1.5 + 4)
+    flown = len(bench.courses)
+    for fix in range(600):
+        bench.now_ns += S // 5
+        bench.control.on_fix(Gps(bench.now_ns, Enu(0, 0, drift_m * fix), Enu(0, 0, 0.1)), bench.now_ns)
+    assert bench.flown.on_ground
+    assert not bench.flown.armed
+    bench.run(15, heartbeats=False)
+    assert len(bench.courses) == flown, "an operator who is lost lifts nobody from the ground"
+
+
+def test_who_climbs_has_taken_off_whoever_asked_for_it() -> None:
+    bench = Bench()
+    bench.run(2)
+    for up in (1.0, 2.0, 3.0):
+        bench.now_ns += S // 5
+        bench.control.on_fix(Gps(bench.now_ns, Enu(0, 0, up), Enu(0, 0, 2.0)), bench.now_ns)
+    assert not bench.flown.on_ground
+    assert bench.flown.armed

@@ -34,8 +34,8 @@ def record(
 
     Args:
         file: FILE.mcap.
-        force: Replace a file that exists.
-        quiet: Say nothing; a file that exists and is empty is filled.
+        force: Replace a file that exists and is not empty.
+        quiet: Say nothing.
         scenario: The scenario of the swarm, needed only if it names files (maps), which the bus does not carry.
 
     """

@@ -140,7 +140,7 @@ def launch(
     # what is wrong is said before the result of another run gives way
     require_possible(chosen)
     doors.doors()
-    beside = [] if output.record is None else [["record", str(output.record.absolute()), "--quiet"]]
+    beside = [] if output.record is None else [["record", str(output.record.absolute()), "--quiet", "--force"]]
     if view or view_port is not None:
         import viser  # noqa: F401
 

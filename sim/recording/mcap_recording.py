@@ -288,12 +288,13 @@ class McapRecording(Observer):
             self._give_up(error)
 
 
-def opened_alone(path: Path) -> BinaryIO:
-    """An empty file that no other recording is written to, unless its file system locks nothing; raises ConfigError."""
+def opened_alone(path: Path, *, emptied: bool = True) -> BinaryIO:
+    """A file that no other recording is written to, unless its file system locks nothing; raises ConfigError."""
     file = path.open("ab")
     try:
         keep_alone(file.fileno(), f"--record {path}: another run records there now; choose another file")
-        file.truncate(0)
+        if emptied:
+            file.truncate(0)
     except BaseException:
         file.close()
         raise

@@ -102,8 +102,12 @@ def test_an_option_whose_value_is_empty_is_refused(words: list[str]) -> None:
 )
 def test_a_refused_request_costs_no_result_that_it_was_to_replace(words: str, said: str, tmp_path: Path) -> None:
     (tmp_path / "summary.json").write_text("{}")
-    assert said in refusal(*words.split(), "--out", str(tmp_path), "--force")
+    (tmp_path / "run.mcap").write_text("of another run")
+    recording = ["--record", str(tmp_path / "run.mcap"), "--force"]
+    assert said in refusal(*words.split(), "--out", str(tmp_path), *recording)
+    assert "/proc/x: cannot be written" in refusal("simulate", "quick", "--out", "/proc/x", *recording)
     assert (tmp_path / "summary.json").read_text() == "{}"
+    assert (tmp_path / "run.mcap").read_text() == "of another run"
 
 
 def test_a_folder_for_the_dialect_that_cannot_be_made_is_no_fault_of_pymavlink() -> None:

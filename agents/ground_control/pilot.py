@@ -320,7 +320,7 @@ class Pilot:
         if place is None:
             return self._course
         if step.command == TAKEOFF:
-            if self._course is not None and self._course.take_off:
+            if self._course is not None and self._course.take_off and self._course.position.up == place.up:
                 return self._course
             return Course(here._replace(up=place.up), min(3.0, self.cruise_m_s), take_off=True)
         if math.isnan(place.east):

@@ -960,3 +960,13 @@ def test_who_climbs_has_taken_off_whoever_asked_for_it() -> None:
         bench.control.on_fix(Gps(bench.now_ns, Enu(0, 0, up), Enu(0, 0, 2.0)), bench.now_ns)
     assert not bench.flown.on_ground
     assert bench.flown.armed
+
+
+def test_a_second_take_off_of_a_mission_climbs_on() -> None:
+    bench = Bench()
+    upload(bench, [(6, TAKEOFF, 0, 0, 10.0, NONE), (2, 93, 0, 0, 0.0, (2, 0, 0, 0)), (6, TAKEOFF, 0, 0, 30.0, NONE)])
+    bench.command(ARM, 1)
+    bench.command(START)
+    bench.run(20)
+    assert bench.flown.mode is Mode.HOLD
+    assert bench.position.up == pytest.approx(30, abs=3.5)

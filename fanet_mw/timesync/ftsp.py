@@ -321,7 +321,8 @@ class TimeSync:
         ended_ns = neighbor.stamps.pop(beacon.hello, None)
         if ended_ns is None or self._is_stale(neighbor.advanced_ns, local_ns):
             return None
-        if neighbor.paired_ns is not None and ended_ns - neighbor.paired_ns < self._own.hello_ns // _HASTY:
+        hello_ns = self._own.hello_ns  # one that seems to be far earlier was heard after this clock has jumped back
+        if neighbor.paired_ns is not None and -hello_ns < ended_ns - neighbor.paired_ns < hello_ns // _HASTY:
             self.counts["hasty"] += 1  # a neighbor that sends more often must not have more weight
             return None
         offset_ns = beacon.t_ns - ended_ns

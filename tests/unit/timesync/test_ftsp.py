@@ -1,5 +1,7 @@
 """Time beacons over hops, by timelines: two steps, election, a reference that comes back, and neighbors that lie."""
 
+import pytest
+
 from fanet_mw.scenario import Clock
 from fanet_mw.timesync.clock_fit import Oscillator
 from fanet_mw.timesync.ftsp import Settings, TimeSync
@@ -166,6 +168,25 @@ def test_a_reference_whose_clock_has_jumped_goes_on_at_its_rate() -> None:
     assert leader.is_reference
     assert leader.line.rate == 0
     assert abs(leader.line.swarm_ns(40 * S - ahead_ns) - 40 * S) < 10 * US
+
+
+@pytest.mark.parametrize("back_s", [2, 4, 20])
+def test_a_clock_that_jumps_back_is_noticed_as_soon_as_one_that_jumps_ahead(back_s: int) -> None:
+    """What neighbors state after the jump seemed to come too soon after what they had stated before it, for as long as
+    the clock took to be where it was.
+    """
+    sync = follower()
+    for second in range(3, 36):
+        ahead_ns = 0 if second < 30 else back_s * S
+        sync.pass_time(second * S - ahead_ns)
+        for node in (3, 4, 5):
+            earlier_ns = (second - 1) * S + node * 20 * MS
+            beacon = said(earlier_ns, second - 1, node=node, hops=1, error_ns=8 * US)
+            hear(sync, node, second, second * S + node * 20 * MS - ahead_ns, beacon)
+    if back_s * S < LIMIT_NS:
+        assert abs(sync.line.swarm_ns(36 * S - ahead_ns) - 36 * S) < 10 * US
+    else:
+        assert sync.reference is None, "this clock can never agree with the swarm's"
 
 
 def test_a_reference_that_comes_back_with_a_time_and_rounds_of_its_own_is_followed_at_once() -> None:

@@ -3,6 +3,7 @@
 import json
 import math
 import queue
+import re
 import sys
 import time
 from collections import Counter
@@ -16,7 +17,7 @@ from typing import Any, Final, NamedTuple
 from fanet_mw import wire
 from fanet_mw.bus import codecs
 from fanet_mw.bus.topics import ROOT, Topics
-from fanet_mw.errors import MalformedFrameError
+from fanet_mw.errors import ConfigError, MalformedFrameError
 from fanet_mw.hosts.bus import Bus, config_of
 from fanet_mw.mavlink import decode
 from sim.bus.operator_commands import OPERATOR, find_swarm
@@ -24,6 +25,7 @@ from sim.console import Console, table
 
 _LOOK_S: Final = 0.5
 _MOST_WAITING: Final = 50_000
+_PART: Final = re.compile(r"\*\*?|[^*$#?]+")
 _FRAMES: Final = ("frame", "data")
 """Fields that hold MAVLink frames."""
 
@@ -38,6 +40,8 @@ class Heard:
     """What is put on some topics, with the instant at which it came; what does not fit is counted."""
 
     def __init__(self, endpoint: str, swarm: str | None, name: str, zenoh_config: Path | None) -> None:
+        if not all(_PART.fullmatch(part) for part in name.split("/")):
+            raise ConfigError(f"topic {name!r}: must be parts between slashes, each a name, * or **")
         self.lost = 0
         self._bus = Bus.join(endpoint, config_of(zenoh_config, OPERATOR))
         self._puts: queue.Queue[tuple[float, str, bytes]] = queue.Queue(_MOST_WAITING)

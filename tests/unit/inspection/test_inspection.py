@@ -26,7 +26,7 @@ from sim.inspection.messages import Messages, fields_of, name_of
 from sim.inspection.packets import Packets
 from sim.inspection.rows import Rows
 from sim.inspection.screen import Inspector, recorded, turn_lines
-from sim.inspection.topics import bandwidth, decoded, plain, rate
+from sim.inspection.topics import Heard, bandwidth, decoded, plain, rate
 from sim.observation.turns import Span, Turns
 from sim.results.files import finish
 from sim.results.run_folder import RunFolder
@@ -278,6 +278,12 @@ def test_rates_are_said_as_hands_that_know_ros_expect_them() -> None:
     assert bandwidth(window) == "555 B/s  mean: 55 B min: 50 B max: 60 B window: 11"
     assert rate(window[:1]) == "no rate yet: 1 puts"
     assert bandwidth([]) == "no bandwidth yet: 0 puts"
+
+
+@pytest.mark.parametrize("name", ["a//b", "/a", "a/", "#", "a?b", "x*y", "a/***", ""])
+def test_what_can_be_no_topic_is_refused_before_anything_is_joined(name: str) -> None:
+    with pytest.raises(ConfigError, match=r"topic '.*': must be parts between slashes"):
+        Heard("tcp/127.0.0.1:1", "quick", name, None)
 
 
 def test_a_put_that_holds_no_messages_says_why() -> None:

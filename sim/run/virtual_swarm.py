@@ -154,7 +154,8 @@ class VirtualSwarm:
         if callable(wanted) and not wanted():
             raise TimeoutError(f"not true by {self.now_s:g} s")
         if self._time.now_ns() < wanted_ns and not callable(wanted):
-            raise TimeoutError(f"wanted = {wanted:g} s: the time ends at {self.now_s:g} s")
+            ends = "the time ends" if self._time.over else f"timeout_s = {timeout_s:g} ends"
+            raise TimeoutError(f"wanted = {wanted:g} s: {ends} at {self.now_s:g} s")
 
     async def run_for(self, duration_s: float) -> None:
         """Let so much time pass."""

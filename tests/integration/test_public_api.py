@@ -99,6 +99,8 @@ async def test_time_is_what_can_pass_and_ends(swarm: MakeSwarm) -> None:
             with pytest.raises(fanet_mw.ConfigError, match="must be a number of seconds >= 0"):
                 await wait
         await s.run_for(7.5)
+        with pytest.raises(TimeoutError, match=r"wanted = 8 s: timeout_s = 0\.1 ends at 7\.6 s"):
+            await s.run_until(8, timeout_s=0.1)
         with pytest.raises(TimeoutError, match="wanted = 9 s: the time ends at 8 s"):
             await s.run_until(9)
     async with swarm("quick", overrides=QUIET) as s:

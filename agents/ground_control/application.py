@@ -78,8 +78,8 @@ _FIXES: Final = 10
 """A UAV that is in the air from the start is compared with its start for so many fixes."""
 _SIGMAS: Final = 6.0
 _LEAST_M: Final = 5.0
-"""A UAV that is farther from its start than this, and than so many standard deviations of GPS, has flown before: its
-computer has started again.
+"""Of a UAV that is farther from its start than this, and than so many standard deviations of GPS, no error is learned:
+its computer has started again, or it stands elsewhere.
 """
 
 
@@ -92,16 +92,20 @@ class HeightReference:
         self._off_m = 0.0
         self._count = 0
         self._has_flown = False
+        self.begins_elsewhere = False
+        """True at a first fix on the ground and far from the start: the UAV was put elsewhere."""
         self.begins_in_flight = False
-        """True at a first fix that is far from the start: the computer has started again in flight."""
+        """True at a first fix in the air and far from the start: the computer has started again in flight."""
 
     def off_m(self, fix: Gps, *, stands: bool) -> float:
         """The error, after another fix; `stands`: the UAV is not known to have taken off."""
         apart = fix.position.minus(self._start)
         moves = abs(fix.velocity.up) > _STILL_M_S
-        far = apart.horizontal() > self._most_m or abs(apart.up) > self._most_up_m
-        self.begins_in_flight = far and not self._count and not self._has_flown
-        self._has_flown |= moves or far or (not stands and self._count >= _FIXES)
+        high, away = abs(apart.up) > self._most_up_m, apart.horizontal() > self._most_m
+        flies = high or (away and apart.up > _LEAST_M)
+        first = not self._count and not self._has_flown
+        self.begins_in_flight, self.begins_elsewhere = first and flies, first and away and not flies
+        self._has_flown |= moves or high or away or (not stands and self._count >= _FIXES)
         if not self._has_flown:
             self._count += 1
             self._off_m += max(_WEIGHT, 1 / self._count) * (apart.up - self._off_m)
@@ -243,6 +247,9 @@ class GroundControl(Application):
         off_m = self._height.off_m(fix, stands=self._pilot.on_ground)
         if self._height.begins_in_flight:
             self._pilot.took_off()
+        elif self._height.begins_elsewhere and self._pilot.on_ground:
+            east, north, _ = fix.position
+            self._pilot.home = self._pilot.home._replace(east=east, north=north)
         self._streams.height_off_m = off_m
         self._pilot.on_fix(fix.position._replace(up=fix.position.up - off_m), fix.velocity, now_ns)
         if self._watched_ns is not None or self._pilot.on_ground is not self._streams.flown.on_ground:

@@ -970,3 +970,20 @@ def test_a_second_take_off_of_a_mission_climbs_on() -> None:
     bench.run(20)
     assert bench.flown.mode is Mode.HOLD
     assert bench.position.up == pytest.approx(30, abs=3.5)
+
+
+def test_who_stands_elsewhere_than_it_was_told_stands_and_returns_there() -> None:
+    """Simulators of autopilots begin where they like, and who starts a UAV in the field need not say where (`--at`)."""
+    bench = Bench()
+    bench.position = Enu(80, -40, 0.0)
+    bench.run(5)
+    assert bench.flown.on_ground
+    assert not bench.flown.armed
+    assert bench.flown.home == Enu(80, -40, 0)
+    bench.airborne()
+    assert go_to(bench, 0, 0, 20) == ACCEPTED
+    bench.run(15)
+    assert bench.command(HOME) == ACCEPTED
+    bench.run(140)
+    assert bench.flown.on_ground
+    assert bench.position == pytest.approx((80, -40, 0), abs=3.5)

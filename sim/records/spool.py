@@ -103,14 +103,17 @@ def in_order(
     folder = source.folder
     if folder is not None and not folder.exists():  # whoever has removed it meanwhile costs no result
         folder = None
-    runs, ends = Spool(folder), [0]
+    try:
+        runs, result = Spool(folder), Spool(folder)
+    except ConfigError:  # there is room for nothing more, not even for a file
+        return None
+    ends = [0]
     for portion in batches(source.items(), least_bytes=_SORTED_BYTES):
         portion.sort(key=key)
         if not runs.append(*portion):
             return None
         ends.append(runs.size)
     merged = heapq.merge(*(runs.items(start, end) for start, end in pairwise(ends)), key=key)
-    result = Spool(folder)
     for portion in batches(map(change, merged), least_bytes=_BLOCK_BYTES):
         if not result.append(*portion):
             return None

@@ -1,5 +1,6 @@
 """Traces on disk: in order whatever the order of their coming, and read by kinds as in memory."""
 
+import errno
 import os
 import tracemalloc
 from collections.abc import Iterator
@@ -108,3 +109,16 @@ def test_a_folder_that_is_removed_during_the_run_costs_no_records(tmp_path: Path
         spools.append([LetOut(3, 1, 1), LetOut(2, 1, 0)])
         folder.rmdir()
         assert [one.t_ns for one in spools.records(true_delays=False)] == [2, 3]
+
+
+def test_where_no_further_file_can_be_made_they_are_sorted_in_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A disk may have room and no inode left."""
+    spools = RecordSpools()
+    records = [Generated(MS * (50 - i), 1, i, "traffic", 9) for i in range(50)]
+    spools.append(records)
+
+    def no_inode(**_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(module.tempfile, "TemporaryFile", no_inode)
+    assert [*spools.records(true_delays=False)] == records[::-1]

@@ -92,10 +92,10 @@ def _first_of_each(outcome: Outcome, kind: type[Approaching] | type[Detected]) -
     return sorted(t_ns / S for t_ns in first.values())
 
 
-def age_s(outcome: Outcome) -> float:
+def age_s(outcome: Outcome) -> float | None:
     """The mean time [s] since the generation of the newest packet that a node has of another one, over the window of
     the traffic and all pairs (source, target). Before the first packet it counts as generated at the window's
-    beginning.
+    beginning. None if nobody sends.
     """
     start_ns, end_ns = outcome.scenario.traffic_window_ns
     heard = _heard_of(first_class_of(outcome))
@@ -104,7 +104,7 @@ def age_s(outcome: Outcome) -> float:
         for source in sources_of(outcome.scenario)
         for target in targets_of(outcome.scenario, source)
     ]
-    return math.fsum(ages_s) / len(ages_s) if ages_s else 0.0
+    return math.fsum(ages_s) / len(ages_s) if ages_s else None
 
 
 def report_age_s(outcome: Outcome) -> float | None:

@@ -79,6 +79,7 @@ def test_the_age_of_information_is_that_of_the_newest_packet_on_average_over_tim
     assert measured("age_s", [*born, *came], *settings) == pytest.approx(2.6)
     assert measured("age_s", [*born, *came, late], *settings) == pytest.approx(2.6)
     assert measured("age_s", born, *settings) == pytest.approx(5.0)
+    assert measured("age_s", [], *settings, "traffic.arrivals=none") is None, "who sends nothing has no age"
 
 
 def test_the_age_of_reports_runs_from_a_reporters_first_to_its_last_over_all_others() -> None:

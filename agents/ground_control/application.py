@@ -42,6 +42,7 @@ _NOTICE: Final = common.MAV_SEVERITY_NOTICE
 _LONGEST: Final = 900
 """Inner bytes of a packet over the air."""
 _SLOWEST_NS: Final = 60 * S
+"""Refusals alone make telemetry no rarer than this."""
 _TRIES_NS: Final = 120 * S
 """After so long without a refusal telemetry is sent twice as often, down to the interval that leaves the air room."""
 _WATCHED_NS: Final = 10 * S
@@ -202,7 +203,7 @@ class GroundControl(Application):
         if status.interval_ns is not None:
             self._pace_ns = max(self._pace_ns, status.interval_ns)
         else:
-            self._pace_ns = min(_SLOWEST_NS, 2 * self._pace_ns)
+            self._pace_ns = max(self._pace_ns, min(_SLOWEST_NS, 2 * self._pace_ns))
 
     def _take(self, frames_: bytes, now_ns: int) -> None:
         if now_ns // S != self._second:

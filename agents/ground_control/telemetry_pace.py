@@ -3,7 +3,7 @@
     interval = nodes x frames that carry one packet x airtime of one / the share of the air for telemetry
 
 A packet that is flooded is carried by every node; with a route it is carried by as many as the way has hops, for which
-half the columns of a square swarm are taken. Where the network states least intervals, those hold if they are longer.
+the columns of a square swarm are taken. Where the network states least intervals, those hold if they are longer.
 """
 
 import math
@@ -18,7 +18,6 @@ SHARE: Final = 0.1
 PACKET_BYTES: Final = 400
 """A packet of telemetry: each stream once."""
 _SHORTEST_NS: Final = S
-_LONGEST_NS: Final = 30 * S
 _ROUTED: Final = frozenset({"aodv", "olsr", "dsdv", "geographic"})
 
 
@@ -37,5 +36,5 @@ def pace_of(scenario: Scenario) -> Pace:
     carried = 1 if scenario.routing.protocol == "direct" else carried
     one_ns = airtime_ns(PACKET_BYTES + OVERHEAD_BYTES, scenario.radio, rate_mbps=scenario.radio.rate_mbps)
     all_ns = count * carried * one_ns
-    interval_ns = min(_LONGEST_NS, max(_SHORTEST_NS, round(all_ns / SHARE)))
+    interval_ns = max(_SHORTEST_NS, round(all_ns / SHARE))
     return Pace(interval_ns, all_ns / interval_ns)

@@ -58,7 +58,8 @@ OVER_AIR: Final = frozenset({
     common.MAVLINK_MSG_ID_MISSION_ITEM_INT, common.MAVLINK_MSG_ID_MISSION_ITEM,
     common.MAVLINK_MSG_ID_MISSION_REQUEST_LIST, common.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
     common.MAVLINK_MSG_ID_MISSION_REQUEST, common.MAVLINK_MSG_ID_MISSION_CLEAR_ALL,
-    common.MAVLINK_MSG_ID_MISSION_ACK,
+    common.MAVLINK_MSG_ID_MISSION_ACK, common.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST,
+    common.MAVLINK_MSG_ID_MISSION_REQUEST_PARTIAL_LIST,
 })  # fmt: skip
 """The messages with which a packet of the post for a UAV may begin."""
 _TYPE_MISMATCH: Final = 7  # MAV_PARAM_ERROR_TYPE_MISMATCH of common.xml, which pymavlink 2.4.50 does not have yet

@@ -155,6 +155,10 @@ class PlanTransfer:
             self.plans[kind] = []
         self._ack(peer, message.mission_type, _ACCEPTED)
 
+    def _on_part(self, message: Any, peer: Peer, _now_ns: int) -> None:  # noqa: ANN401
+        """A plan goes as a whole: MAVLink has deprecated parts."""
+        self._ack(peer, message.mission_type, common.MAV_MISSION_UNSUPPORTED)
+
     def _on_ack(self, message: Any, peer: Peer, _now_ns: int) -> None:  # noqa: ANN401
         """A ground station ends a download, or gives up its upload."""
         kind = Kind(message.mission_type)
@@ -177,4 +181,6 @@ class PlanTransfer:
         "MISSION_REQUEST": _on_request,
         "MISSION_CLEAR_ALL": _on_clear,
         "MISSION_ACK": _on_ack,
+        "MISSION_WRITE_PARTIAL_LIST": _on_part,
+        "MISSION_REQUEST_PARTIAL_LIST": _on_part,
     }

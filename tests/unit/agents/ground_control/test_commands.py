@@ -6,6 +6,8 @@ from itertools import pairwise
 import pytest
 from operator_bench import GCS, LAT, LON, Bench, degrees, scenario
 
+from agents.ground_control.application import OVER_AIR, GroundControl
+from agents.ground_control.plan_transfer import PlanTransfer
 from agents.ground_control.settings import settings_of
 from fanet_mw import mavlink
 from fanet_mw.application import Course, Fate, Received, Status
@@ -987,3 +989,23 @@ def test_who_stands_elsewhere_than_it_was_told_stands_and_returns_there() -> Non
     bench.run(140)
     assert bench.flown.on_ground
     assert bench.position == pytest.approx((80, -40, 0), abs=3.5)
+
+
+@pytest.mark.parametrize("kind", [0, 1])
+def test_a_part_of_a_plan_is_refused_and_never_met_with_silence(kind: int) -> None:
+    """MAVProxy changes a single item by `wp update` in this way."""
+    bench = Bench()
+    upload(bench, square())
+    for message in (
+        common.MAVLink_mission_write_partial_list_message(1, 1, 1, 2, kind),
+        common.MAVLink_mission_request_partial_list_message(1, 1, 1, 2, kind),
+    ):
+        (answer,) = bench.say(message)
+        assert (answer.get_type(), answer.type) == ("MISSION_ACK", common.MAV_MISSION_UNSUPPORTED)
+        assert answer.mission_type == kind
+
+
+def test_all_that_a_uav_answers_may_come_over_the_air() -> None:
+    understood = {*GroundControl._HANDLERS, *PlanTransfer._HANDLERS}
+    ids = {number for number, message in common.mavlink_map.items() if message.msgname in understood}
+    assert ids == OVER_AIR

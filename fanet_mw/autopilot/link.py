@@ -106,9 +106,9 @@ class AutopilotLink:
 
     # --- in -------------------------------------------------------------------------------------------------------
 
-    def on_bytes(self, data: bytes, now_ns: int, *, whole: bool = True) -> None:
-        """Some bytes of its connection; `whole`: they are a datagram."""
-        for frame in self._framing.datagram(data) if whole else self._framing.frames(data):
+    def on_bytes(self, data: bytes, now_ns: int) -> None:
+        """Some bytes of its connection; not even a datagram need begin or end with a frame, as bridges cut anywhere."""
+        for frame in self._framing.frames(data):
             if frame.component != AUTOPILOT_COMPONENT or self.system not in (None, frame.system):
                 self.counts["of_others"] += 1
                 continue

@@ -42,12 +42,11 @@ class Autopilot:
         self.link = link
         self._name, self._now_ns, self._tell, self._hears = name, now_ns, tell, hears
         self._clock_off = False
-        whole = address.kind.startswith("udp")
-        self.connection = Connection(address, lambda _, data: self._hear(data, whole=whole))
+        self.connection = Connection(address, lambda _, data: self._hear(data))
 
-    def _hear(self, data: bytes, *, whole: bool) -> bytes:
+    def _hear(self, data: bytes) -> bytes:
         if self._hears():
-            self.link.on_bytes(data, self._now_ns(), whole=whole)
+            self.link.on_bytes(data, self._now_ns())
         return b""
 
     def tick(self) -> list[Reading]:

@@ -434,6 +434,17 @@ def test_a_take_off_leaves_the_streams_asked_for() -> None:
     }  # fmt: skip
 
 
+@pytest.mark.parametrize("size", [1, 7, 30])
+def test_a_bridge_from_serial_to_udp_may_cut_frames_anywhere(size: int) -> None:
+    controller = Controller()
+    beat = common.MAVLink_heartbeat_message(2, common.MAV_AUTOPILOT_PX4, 1, number_of(Mode.HOLD), 4, 3)
+    sent = b"".join(bytes(beat.pack(controller.mav)) for _ in range(20))
+    for at in range(0, len(sent), size):
+        controller.link.on_bytes(sent[at : at + size], controller.now_ns)
+    assert controller.link.mode is Mode.HOLD
+    assert not controller.link.counts["stray_bytes"]
+
+
 def test_other_systems_on_the_line_are_not_taken_for_it() -> None:
     controller = Controller()
     controller.run(3)

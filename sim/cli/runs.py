@@ -5,7 +5,7 @@ A command parses, shows progress and returns an exit code. It imports the functi
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
 from time import monotonic
@@ -18,6 +18,7 @@ from fanet_mw.errors import ConfigError, FanetError
 from sim.cli.companions import Companions
 from sim.cli.memory import compile_kernel
 from sim.cli.options import DoorFlags, OutputFlags, ScenarioFlags, ScenarioName, print_notes, warn_of
+from sim.cli.watching import ERR, say, watched
 from sim.console import Console
 
 if TYPE_CHECKING:
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     from sim.results.outcome import Outcome
     from sim.run.collecting.running_tally import Progress
 
-_err = Console(stderr=True)
 _WORD_EVERY_S = 10.0
 """The interval of the lines that say how a run fares where no terminal shows a progress bar."""
 
@@ -63,7 +63,7 @@ def _simulate(chosen: "Scenario", output: OutputFlags) -> int:
 
     with output.prepared():
         print_notes(chosen)
-        compile_kernel(_say)
+        compile_kernel(say)
         signals: list[int] = []
         path = output.capture_path()
         capture = PcapFile(path, chosen.radio, receptions=output.pcap_receptions) if path else nullcontext()
@@ -153,7 +153,7 @@ def launch(
         beside.append(["autopilots", autopilots, "--flavor", doors.flavor])
     with output.prepared():
         # another's world has the scenario as it is
-        chosen, leads = (chosen, None) if no_world else fitted(chosen, _say)
+        chosen, leads = (chosen, None) if no_world else fitted(chosen, say)
         print_notes(chosen)
         warn_of(listen, listens=True)
         warn_of(connect, listens=False)
@@ -176,7 +176,7 @@ def launch(
                     emulator_options={"pcap": output.capture_path(), "receptions": output.pcap_receptions},
                     spool_folder=output.out,
                     on_progress=tell,
-                    on_event=_say,
+                    on_event=say,
                     leads=leads,
                     on_started=lambda run: companions.start(run.address, chosen),
                     awaited=companions.awaited,
@@ -184,7 +184,7 @@ def launch(
             )
         failed = {name: f"fanet {name} ended with {how}" for name, how in companions.failed.items()}
         for sentence in failed.values():
-            _say(sentence)
+            say(sentence)
         return finish(outcome, output, {str(output.record): failed["record"]} if "record" in failed else {})
 
 
@@ -233,7 +233,7 @@ def _simulated(scenario: "Scenario", *, quiet: bool) -> "Iterator[tuple[Callable
     from sim.run.collecting.running_tally import Progress, RunningTally
 
     began_s = monotonic()
-    tally = RunningTally(scenario) if _err.is_terminal and not quiet else None
+    tally = RunningTally(scenario) if ERR.is_terminal and not quiet else None
 
     def progress(seconds: float) -> Progress:
         pace = seconds / max(1e-3, monotonic() - began_s)
@@ -248,40 +248,10 @@ def _simulated(scenario: "Scenario", *, quiet: bool) -> "Iterator[tuple[Callable
 
 
 @contextmanager
-def _watched(scenario: "Scenario", *, bar: bool, lines: bool = True) -> Iterator[Callable[["Progress"], None]]:
-    """A progress bar for a person who is watching, and else a line every ten seconds, both on standard error."""
-    if not (bar if _err.is_terminal else lines):
-        yield lambda _: None
-        return
-    if _err.is_terminal:
-        from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
-        from rich.progress import Progress as Bar
-
-        columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.0f}/{task.total:.0f} s"))
-        shown = Bar(*columns, TimeElapsedColumn(), console=_err, transient=True)
-        task = shown.add_task(scenario.name, total=scenario.duration_s)
-        shown.start()
-        try:
-            yield lambda at: shown.update(task, completed=at.swarm_s, description=f"{scenario.name}: {at.in_words()}")
-        finally:
-            with suppress(OSError):  # as in `_say`
-                shown.stop()
-        return
-    said_s = monotonic()
-
-    def say(progress: "Progress") -> None:
-        nonlocal said_s
-        if monotonic() >= said_s + _WORD_EVERY_S:
-            said_s = monotonic()
-            _say(progress.sentence())
-
-    yield say
-
-
-def _say(text: str) -> None:
-    """Say something to whoever watches; a terminal that has gone must not cost the result."""
-    with suppress(OSError):
-        _err.print(text, highlight=False, soft_wrap=True)  # above the bar, if there is one
+def _watched(scenario: "Scenario", *, bar: bool, lines: bool = True) -> "Iterator[Callable[[Progress], None]]":
+    """Says how a swarm fares."""
+    with watched(scenario.name, scenario.duration_s, "s", every_s=_WORD_EVERY_S, bar=bar, lines=lines) as tell:
+        yield lambda at: tell(at.swarm_s, at.in_words(), at.sentence())
 
 
 def _say_failure(error: BaseException, what: str) -> None:
@@ -289,8 +259,8 @@ def _say_failure(error: BaseException, what: str) -> None:
     from traceback import format_exception
 
     if not isinstance(error, FanetError):
-        _say("".join(format_exception(error)).rstrip())
-    _say(f"ended early: {what}")
+        say("".join(format_exception(error)).rstrip())
+    say(f"ended early: {what}")
 
 
 def finish(outcome: "Outcome", output: OutputFlags, cut: dict[str, str] | None = None) -> int:
@@ -314,5 +284,5 @@ def finish(outcome: "Outcome", output: OutputFlags, cut: dict[str, str] | None =
             console.print(f"written to {output.out}", highlight=False, soft_wrap=True)
     for name, why in summary["unwritten"].items():
         if name not in (cut or ()):  # those were named as they ended
-            _say(f"{name} in --out {output.out} ends early or is missing: {why}")
+            say(f"{name} in --out {output.out} ends early or is missing: {why}")
     return 0 if summary["valid"] else 1

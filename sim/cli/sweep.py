@@ -17,6 +17,7 @@ from cyclopts.validators import Number
 from fanet_mw.errors import ConfigError
 from sim.cli.memory import compile_kernel
 from sim.cli.options import require_said_once
+from sim.cli.watching import say, watched
 from sim.console import Console
 
 if TYPE_CHECKING:
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
     from sim.sweep.spec import Case, Sweep
     from sim.sweep.whole_sweep import Progress, RemainingRuns, Workers
 
-_err = Console(stderr=True)
 _SAY_S: Final = 20.0
 """The interval at which progress is printed if there is no terminal for a progress bar."""
 _KEPT_NOTICE: Final = "they are kept, and the column `code` tells; --rerun-older runs exactly these again"
@@ -96,18 +96,18 @@ def carry_out(
             store.read()
         plan = RemainingRuns(tasks, store, retry=retry, only_code=code() if rerun_older else None)
         workers = _workers(jobs, scheduler, plan, dry_run=dry_run)
-        _say(_announcement(name, wanted, plan, workers))
+        say(_announcement(name, wanted, plan, workers))
         _warn_of_codes(plan.codes, "they are run again" if rerun_older else _KEPT_NOTICE)
         if dry_run:
             return 0
         if plan.todo:  # once, so that not every worker does so for itself
-            compile_kernel(_say)
+            compile_kernel(say)
         began, began_cpu_s = time.monotonic(), processor_s()
-        with own_output(json=json), _progress(name, quiet=json) as tell:
+        with own_output(json=json), _progress(name, plan.total, quiet=json) as tell:
             try:
                 table = run(plan, store, workers, wanted.varied(), on_progress=tell)
             except KeyboardInterrupt:
-                _say(f"interrupted: what is finished is kept in {out}; the same command goes on from there")
+                say(f"interrupted: what is finished is kept in {out}; the same command goes on from there")
                 raise
     statuses = table.column("status").to_pylist()
     failed = statuses.count("failed")
@@ -181,7 +181,7 @@ def _counted(count: int, noun: str) -> str:
 
 def _warn_of_codes(codes: Mapping[str, int], what_follows: str) -> None:
     if others := runs_of_other_code(codes):
-        _say(f"{others}: {what_follows}", style="bold")
+        say(f"{others}: {what_follows}", style="bold")
 
 
 def runs_of_other_code(codes: Mapping[str, int]) -> str:
@@ -197,47 +197,22 @@ def runs_of_other_code(codes: Mapping[str, int]) -> str:
     )
 
 
-def _say(text: str, *, style: str | None = None) -> None:
-    _err.print(text, style=style, highlight=False, soft_wrap=True)
-
-
 def _say_failures(table: "Table") -> None:
     rows = [row for row in table.select(["status", "error", "command"]).to_pylist() if row["status"] == "failed"]
-    _say(f"{_counted(len(rows), 'run')} failed:", style="bold red")
+    say(f"{_counted(len(rows), 'run')} failed:", style="bold red")
     for row in rows[:5]:
-        _err.print(
-            f"  {row['error'].splitlines()[0]}\n    {row['command']}", markup=False, highlight=False, soft_wrap=True
-        )
+        say(f"  {row['error'].splitlines()[0]}\n    {row['command']}")
 
 
 @contextlib.contextmanager
-def _progress(name: str, *, quiet: bool) -> "Iterator[Callable[[Progress], None]]":
-    """A progress bar if a person is watching, otherwise a line from time to time."""
-    if quiet:
-        yield lambda _: None
-        return
-    if not _err.is_terminal:
-        said = time.monotonic()
-
-        def line(at: "Progress") -> None:
-            nonlocal said
-            if time.monotonic() - said >= _SAY_S and at.done < at.total:
-                said = time.monotonic()
-                _say(f"{name}: {at.done} of {at.total} runs{_left(at)}{_failures(at)}")
-
-        yield line
-        return
-    from rich.progress import BarColumn, TextColumn
-    from rich.progress import Progress as Bar
-
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed}/{task.total}"),
-               TextColumn("{task.fields[left]}"))  # fmt: skip
-    with Bar(*columns, console=_err, transient=True) as bar:
-        shown = bar.add_task(name, total=None, left="")
+def _progress(name: str, total: int, *, quiet: bool) -> "Iterator[Callable[[Progress], None]]":
+    """Says how far a sweep is."""
+    with watched(name, total, "runs", every_s=_SAY_S, bar=not quiet, lines=not quiet) as tell:
 
         def renew(at: "Progress") -> None:
-            left = f"{_left(at)}{_failures(at)}".removeprefix(", ")
-            bar.update(shown, completed=at.done, total=at.total, left=left)
+            rest = f"{_left(at)}{_failures(at)}"
+            if at.done < at.total:  # the end is said by what came of it
+                tell(at.done, rest.removeprefix(", "), f"{name}: {at.done} of {at.total} runs{rest}")
 
         yield renew
 

@@ -7,7 +7,7 @@ import pytest
 from kit import MakeScenario
 
 from fanet_mw.scenario import Scenario
-from sim.cli import runs
+from sim.cli import runs, watching
 from sim.console import Console
 from sim.run.collecting.running_tally import Progress
 
@@ -19,7 +19,7 @@ def state(swarm_s: float) -> Progress:
 def told(monkeypatch: pytest.MonkeyPatch, scenario: Scenario, *, up_s: float, lasts_s: int) -> None:
     """A run that is up after so long and lasts so long, with its progress four times a second."""
     now_s = 100.0
-    monkeypatch.setattr(runs, "monotonic", lambda: now_s)
+    monkeypatch.setattr(watching, "monotonic", lambda: now_s)
     with runs._watched(scenario, bar=False) as tell:
         for quarter in range(4 * lasts_s):
             now_s = 100 + up_s + quarter / 4
@@ -52,8 +52,8 @@ def test_nobody_who_listens_costs_no_run(monkeypatch: pytest.MonkeyPatch) -> Non
     def gone(*_: object, **__: object) -> None:
         raise BrokenPipeError
 
-    monkeypatch.setattr(runs._err, "print", gone)
-    runs._say("47 processes up")
+    monkeypatch.setattr(watching.ERR, "print", gone)
+    watching.say("47 processes up")
 
 
 class ClosingTerminal(io.StringIO):
@@ -75,7 +75,7 @@ def test_a_terminal_that_is_closed_costs_no_result(
 ) -> None:
     """The bar raised as it was taken away, before anything was written: all that was flown was lost with the window."""
     terminal = ClosingTerminal()
-    monkeypatch.setattr(runs, "_err", Console(file=terminal, force_terminal=True))
+    monkeypatch.setattr(watching, "ERR", Console(file=terminal, force_terminal=True))
     with runs._watched(make_scenario(), bar=True) as tell:
         tell(state(1.0))
         terminal.closes = True

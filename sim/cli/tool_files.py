@@ -27,12 +27,10 @@ def write_dialect(folder: Path) -> Path:
         definitions = _with_included(ours / "fanet.xml", theirs)
     except FileNotFoundError as error:
         raise ConfigError(f"{error.filename}: is missing: install pymavlink anew") from error
-    try:
+    with writing(target):
         target.mkdir(parents=True, exist_ok=True)
         for name, text in definitions.items():
             replace_file(target / name, text.encode())
-    except OSError as error:
-        raise ConfigError(f"{target}: cannot be written: {error.strerror}") from error
     return target / "fanet.xml"
 
 

@@ -13,6 +13,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from typing import Final
 
+from sim.results.outcome import described
 from sim.run.launcher import process_setup
 from sim.run.launcher.process_setup import be_killed_with_parent
 from sim.sweep.one_run import Finished, carry_out
@@ -70,7 +71,8 @@ class Pool:
                         if deaths[task.key] < _LIVES:
                             waiting.appendleft(task)
                         else:
-                            yield Finished(task.key, code(), 0.0, error=_last_words(exit_code))
+                            why = f"the process that ran it died with {described(exit_code)}, {_LIVES} times"
+                            yield Finished(task.key, code(), 0.0, error=why)
                         continue
                     worker.task = None
                     yield done
@@ -120,8 +122,3 @@ class Pool:
             worker.process.kill()  # one that was stopped (SIGSTOP) heeds nothing else
         for worker in list(self._running):
             self._bury(worker)
-
-
-def _last_words(exit_code: int) -> str:
-    how = f"signal {signal.Signals(-exit_code).name}" if exit_code < 0 else f"exit code {exit_code}"
-    return f"the process that ran it died with {how}, {_LIVES} times"

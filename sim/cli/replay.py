@@ -42,6 +42,8 @@ def replay(
             raise ConfigError(f"{name} {page}: must be a file whose name ends in .html")
     if given and start:
         raise ConfigError(f"--start and {given[0]}: only a replay in the browser begins later than at 0 s")
+    if given and port is not None:
+        raise ConfigError(f"--port and {given[0]}: only a replay in the browser has a port")
     if not 0 <= start < math.inf:
         raise ConfigError(f"--start {start:g}: must be 0 or more")
     if at is None and map_ is None:

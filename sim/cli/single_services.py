@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from fanet_mw.errors import FanetError
+from fanet_mw.errors import ConfigError, FanetError
 from sim.bus.running_swarms import DEFAULT_ENDPOINT
 from sim.cli.options import OutputFlags, ScenarioFlags, ScenarioName, ServiceFlags, SwarmFlags, warn_of
 from sim.cli.runs import finish
@@ -74,6 +74,8 @@ def emulator(
     from emulator.compile_kernel import COMPILING_NOTICE, must_compile
     from emulator.process import run
 
+    if pcap_receptions and pcap is None:
+        raise ConfigError("--pcap-receptions: needs --pcap FILE")
     chosen = choice.realtime_scenario(scenario)
     if must_compile():
         tell(COMPILING_NOTICE)

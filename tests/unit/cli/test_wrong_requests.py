@@ -64,6 +64,7 @@ def test_a_number_that_is_not_whole_is_not_rounded_to_one(words: str) -> None:
         ("--html a.html --map b.html", "--html and --map: one of them at a time"),
         ("--html a.html --at 3", "--html and --at: one of them at a time"),
         ("--html a.html --start 3", "--start and --html: only a replay in the browser begins later than at 0 s"),
+        ("--map a.html --port 8081", "--port and --map: only a replay in the browser has a port"),
     ],
 )
 def test_a_replay_is_written_over_nothing_but_a_page_and_never_left_out(words: str, said: str) -> None:
@@ -112,6 +113,10 @@ def test_a_refused_request_costs_no_result_that_it_was_to_replace(words: str, sa
 
 def test_a_folder_for_the_dialect_that_cannot_be_made_is_no_fault_of_pymavlink() -> None:
     assert refusal("dialect", "/proc/nowhere") == "/proc/nowhere/v1.0: cannot be written: No such file or directory"
+
+
+def test_receptions_without_a_capture_are_refused() -> None:
+    assert refusal("emulator", "quick", "--pcap-receptions") == "--pcap-receptions: needs --pcap FILE"
 
 
 def test_a_link_from_a_node_to_itself_is_refused_in_words() -> None:

@@ -47,7 +47,8 @@ Changes = Annotated[dict[str, Any], BeforeValidator(flattened)]
 """Scenario keys, each with its value."""
 Axes = Annotated[dict[str, Annotated[list[Any], Field(min_length=1)]], BeforeValidator(flattened)]
 """Scenario keys, each with the values that it takes in turn."""
-Seeds = Annotated[int, Field(ge=1, le=10_000)] | Annotated[list[Annotated[int, Field(ge=0)]], Field(min_length=1)]
+_Seed = Annotated[int, Field(strict=True, ge=0)]
+Seeds = Annotated[int, Field(strict=True, ge=1, le=10_000)] | Annotated[list[_Seed], Field(min_length=1)]
 
 
 class _Table(BaseModel):
@@ -60,7 +61,7 @@ class Case(_Table):
     name: Annotated[str, Field(min_length=1, max_length=64)]
     set: Changes = {}
     grid: Axes = {}
-    realtime: bool = False
+    realtime: Annotated[bool, Field(strict=True)] = False
     """True for runs as real processes: on this machine, one at a time, after all others."""
     slow_down_to: Annotated[float, Field(ge=1e-3, le=100)] | None = None
     """The scale to which the clock of runs as processes may slow down while the machine cannot keep up; None: never."""
@@ -206,7 +207,7 @@ def parse(text: str, *, source: str) -> Sweep:
 
 def _sentence(item: Mapping[str, Any]) -> str:
     """One mistake as `key = value: bound`."""
-    key = ".".join(str(part) for part in item["loc"] if part not in {"int", "list[constrained-int]"})
+    key = ".".join(str(part) for part in item["loc"] if "constrained-int" not in str(part))
     if item["type"] == "extra_forbidden":
         tables: Mapping[str, type[_Table]] = {"case": Case, "quick": SweepVariant, "full": SweepVariant}
         table = tables.get(str(item["loc"][0]), Sweep)

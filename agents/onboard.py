@@ -205,7 +205,9 @@ class Onboard:
             if course is None:
                 continue
             judges = () if application.avoids else self._callbacks.permits
-            objections = [o for o in judges if o is not application and not o.permits(course, now_ns)]
+            objections = [o for o in judges if o is not application and not o.avoids and not o.permits(course, now_ns)]
+            # whoever avoids collisions flies the course later that it has judged last
+            objections = objections or [o for o in judges if o.avoids and not o.permits(course, now_ns)]
             if not objections:
                 self._fly(course, now_ns)
 

@@ -183,6 +183,20 @@ def test_of_several_courses_the_last_is_flown_if_no_other_application_objects(
     assert flown == ([Setpoint(S, ELSEWHERE.position, ELSEWHERE.speed_m_s)] if willing else [])
 
 
+def test_who_avoids_collisions_keeps_no_course_for_later_to_which_another_objects(make_scenario: MakeScenario) -> None:
+    """It flies that course once the others are clear: of a UAV whose operator holds it, too."""
+    avoider, operator = Diary("avoider"), Diary("judge", permits=False)
+    avoider.avoids = True
+    made = uav(make_scenario, Pilot(), avoider, operator)
+    fix = Gps(S, Enu(1, 2, 3), Enu(0, 0, 0))
+    made.receive(NAMES.sensor(OWN, "gps"), fix, S)
+    assert ELSEWHERE in operator.lines
+    assert ELSEWHERE not in avoider.lines
+    operator.willing = True
+    made.receive(NAMES.sensor(OWN, "gps"), fix._replace(t_ns=2 * S), 2 * S)
+    assert ELSEWHERE in avoider.lines
+
+
 class Caller(Application):
     """Sends a heartbeat at second 1, as if it had meant to at another instant, and shows it."""
 

@@ -48,7 +48,7 @@ class MissionFlight:
         if not at:
             self._jumps.clear()
 
-    def resume(self, _now_ns: int) -> None:
+    def resume(self) -> None:
         """Go on where the mission was left, or from the beginning when it is over."""
         if self.at >= len(self.steps):
             self.go_to(0)

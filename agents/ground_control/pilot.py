@@ -185,7 +185,7 @@ class Pilot:
         if self.mission.steps:
             if not self.armed:
                 return False
-            self.mission.resume(now_ns)
+            self.mission.resume()
             self._enter(Mode.MISSION, None)
             self._fly_step(now_ns)
             return True

@@ -51,8 +51,6 @@ _ARG_START, _ARG_END = 48 - 3, 49 - 3
 
 def entitle(name: str, title: str) -> None:
     """Name this process (15 characters), and make its command line `title`, as far as there is room."""
-    if sys.platform != "linux":
-        return
     ctypes.CDLL(None).prctl(_PR_SET_NAME, name.encode()[:_NAME_BYTES], 0, 0, 0)
     fields = Path("/proc/self/stat").read_text(encoding="latin-1").rpartition(")")[2].split()
     start, end = int(fields[_ARG_START]), int(fields[_ARG_END])
@@ -111,9 +109,8 @@ def _keep_no_tracker_alive() -> None:
 def _give_way() -> None:
     """With `SCHED_BATCH` a UAV that wakes up does not interrupt another's step, when the world's poses wake all."""
     os.nice(_NICENESS)
-    if sys.platform == "linux":
-        with contextlib.suppress(OSError):  # a container may forbid it; the niceness helps, too
-            os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
+    with contextlib.suppress(OSError):  # a container may forbid it; the niceness helps, too
+        os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
 
 def end_if_imported_by_a_child() -> None:

@@ -62,7 +62,9 @@ class PauseWatch:
 def longest_pause_ns(for_s: float) -> int:
     """The longest pause of any processor that this process may use, measured for some time by waking up on all."""
     found: list[int] = []
-    threads = [threading.Thread(target=_measure, args=(processor, for_s, found)) for processor in sorted(_processors())]
+    threads = [
+        threading.Thread(target=_measure, args=(processor, for_s, found)) for processor in os.sched_getaffinity(0)
+    ]
     for thread in threads:
         thread.start()
     for thread in threads:
@@ -72,9 +74,8 @@ def longest_pause_ns(for_s: float) -> int:
 
 def _measure(processor: int, for_s: float, found: list[int]) -> None:
     """Sleep for a millisecond at a time on one processor, and note the longest delay."""
-    if hasattr(os, "sched_setaffinity"):
-        with contextlib.suppress(OSError):
-            os.sched_setaffinity(0, {processor})  # of this thread alone
+    with contextlib.suppress(OSError):
+        os.sched_setaffinity(0, {processor})  # of this thread alone
     began_ns = last_ns = time.monotonic_ns()
     longest_ns = 0
     while last_ns < began_ns + for_s * S:
@@ -84,13 +85,9 @@ def _measure(processor: int, for_s: float, found: list[int]) -> None:
     found.append(longest_ns)
 
 
-def _processors() -> set[int]:
-    return os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set(range(os.cpu_count() or 1))
-
-
 def processors() -> float:
     """The number of processors that this process may use, which a container's quota can make a fraction."""
-    count = float(len(_processors()))
+    count = float(len(os.sched_getaffinity(0)))
     with contextlib.suppress(OSError, ValueError):
         quota, period = _QUOTA.read_text(encoding="ascii").split()
         count = min(count, int(quota) / int(period))  # without a quota its word is "max", which is no number

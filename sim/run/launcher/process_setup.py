@@ -7,7 +7,6 @@ multiprocessing starts processes by `python -c`, which looks there first for wha
 import ctypes
 import os
 import signal
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final
@@ -35,6 +34,5 @@ def restore() -> None:
 
 
 def be_killed_with_parent() -> None:
-    """Let Linux kill this process when the thread that forked it ends; on other systems nothing happens."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    """Let Linux kill this process when the thread that forked it ends."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)

@@ -53,14 +53,15 @@ class Goal:
         if survivor is None or place is None:
             return lane, moves
         east, north = self._approach.next_point(survivor, place, now_ns, responding=survivor == task)
-        look = Enu(east, north, lane.up)
+        look, seen = Enu(east, north, lane.up), self._survivors.by_id[survivor].filter.is_seen
         if self._listening is not None:
-            seen = self._survivors.by_id[survivor].filter.is_seen
             misses_m = 0.0 if leaves else formation.misses_m(place, lane, moves, now_ns)
             look = self._listening.goal(survivor, place, look, seen=seen, misses_m=misses_m, now_ns=now_ns)
         if leaves:
             return look, STILL
-        goal, feed = formation.bounded(look.east, look.north, lane, moves, now_ns, leads=survivor == task)
+        goal, feed = formation.bounded(
+            look.east, look.north, lane, moves, now_ns, leads=survivor == task, views=not seen
+        )
         return goal._replace(up=look.up), feed
 
     def _in_lane(self, lane: Enu, moves: Enu, now_ns: int) -> int | None:

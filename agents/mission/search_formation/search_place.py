@@ -60,6 +60,7 @@ class SearchPlace:
         self._node = node
         self._own_motion = own_motion
         self._reach_m, self._most_m = reach_m, _FREE_REACH * reach_m
+        self._view_m = 0.0 if math.isinf(look_m) else _LOOK_SHARE * look_m
         self._aside_m = min(_ASIDE_M, _LOOK_SHARE * look_m)
         self.plan: Search | None = None
         self.pattern: Pattern | None = None
@@ -304,10 +305,11 @@ class SearchPlace:
         return math.hypot(max(0.0, -_LAG_M - ahead_m), max(0.0, abs(aside_m) - _LEASH_M))
 
     def bounded(
-        self, east: float, north: float, lane: Enu, moves: Enu, now_ns: int, *, leads: bool = False
+        self, east: float, north: float, lane: Enu, moves: Enu, now_ns: int, *, leads: bool = False, views: bool = False
     ) -> tuple[Enu, Enu]:
         """The position nearest to a point at which this UAV may be, and the velocity of that position. `leads`: it may
-        be ahead of its place, whose position and velocity are `lane` and `moves`.
+        be ahead of its place, whose position and velocity are `lane` and `moves`; `views`: while its team moves it
+        leaves its lane only as far as its camera needs to show the point.
         """
         if self.is_free(now_ns):
             return Enu(east, north, lane.up), STILL
@@ -318,6 +320,8 @@ class SearchPlace:
                 lane.east + share * (east - lane.east), lane.north + share * (north - lane.north), lane.up
             ), STILL
         ahead_m, aside_m = along(moves, east - lane.east, north - lane.north)
+        if views:
+            aside_m = math.copysign(max(0.0, abs(aside_m) - self._view_m), aside_m)
         aside_m = max(-_LEASH_M, min(_LEASH_M, aside_m))
         most_m = _LEAD_M if leads else 0.0
         if ahead_m >= most_m:  # it waits for its place to move there

@@ -56,11 +56,12 @@ class Board:
         plan: Search | None = PLAN,
         connection: Connection = "always",
         looked_at: LookedAt | None = None,
+        look_m: float = math.inf,
     ) -> None:
         self.out = Outbox()
         self.survivors = KnownSurvivors(MODEL)
         self.own_motion, self.neighbors = OwnMotion(at, OPEN), NeighborMotions()
-        self.place = SearchPlace(node, self.own_motion, reach_m=REACH_M)
+        self.place = SearchPlace(node, self.own_motion, reach_m=REACH_M, look_m=look_m)
         if plan is not None:
             self.place.adopt(plan, 0)
         self.approach = Approach(

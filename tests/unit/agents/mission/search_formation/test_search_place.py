@@ -68,6 +68,19 @@ def test_a_uav_of_a_line_stays_near_its_lane_and_a_follower_goes_anywhere() -> N
     assert line.bounded(20, 700, lane, moves, 0, leads=True) == (Enu(20, 620, UP_M), moves), "by 120 m at most"
 
 
+@pytest.mark.parametrize(("east_m", "goes_m"), [(40, 0), (-58, 0), (80, 21.5), (-80, -21.5), (300, 58)])
+def test_who_looks_for_somebody_leaves_its_lane_only_as_far_as_its_camera_needs(east_m: float, goes_m: float) -> None:
+    """It went to a false place 48 m to one side, and passed somebody 38 m to the other (rescue, seed 14, 114 s)."""
+    lane, moves = Enu(0, 500, UP_M), Enu(0, 7.5, 0)
+    place = Board(LINE, lane, look_m=65.0).place
+    goal, feed = place.bounded(east_m, 450, lane, moves, 0, views=True)
+    assert (goal.east, goal.north, feed) == (pytest.approx(goes_m), 450, STILL)
+    near_m = max(-58, min(58, east_m))
+    assert place.bounded(east_m, 450, lane, moves, 0)[0].east == near_m, "who has seen somebody flies there"
+    assert place.bounded(40, 450, lane, STILL, 0, views=True)[0].east == 40, "nothing is missed by it at rest"
+    assert Board(LINE, lane).place.bounded(near_m, 450, lane, moves, 0, views=True)[0].east == near_m, "no camera"
+
+
 @pytest.mark.parametrize(("east_m", "north_m"), [(60, 80), (-60, 80), (60, -80), (-60, -80), (0, 100), (100, 0)])
 def test_a_place_at_rest_has_no_side_to_which_a_uav_may_not_go(east_m: float, north_m: float) -> None:
     """North was ahead, so a line at the south edge never looked 20 m behind itself (rescue, seed 3, 155 to 197 s)."""

@@ -74,7 +74,7 @@ def test_who_has_no_plan_yet_goes_to_a_survivor_nearby_and_not_far_from_the_swar
 def test_before_the_sweep_a_uav_responds_that_is_not_led_away_from_the_survivor_by_the_plan() -> None:
     place = lane_of(LINE, TAKEN_UP_NS)
     board = Board(LINE, place._replace(north=place.north + 300))
-    truth = Enu(place.east + 80, place.north + 280, 0)
+    truth = Enu(place.east + 130, place.north + 280, 0)
     board.hear(1, truth, range(1, 5), now_ns=S)
     board.tasks.bid(TAKEN_UP_NS - 10 * S)
     assert board.tasks.bids_to_tell(now_ns=S) == [], "by then its place is far away"
@@ -96,6 +96,31 @@ def test_before_the_sweep_a_responder_that_is_held_back_soon_takes_its_bid_back(
     for after_s, task in ((0, 1), (24, 1), (27, None)):
         board.tasks.choose((1 + after_s) * S)
         assert board.tasks.survivor == task, "75 m at 7.5 m/s, and 15 s"
+
+
+@pytest.mark.parametrize(
+    ("east_m", "north_m", "left_s", "is_first", "stays"),
+    [
+        (0, 370, 2, True, True),  # 70 m from the survivor, and it will be 39 s late at its place
+        (0, 230, 2, False, False),
+        (160, 300, 2, True, False),  # farther than 120 m
+        (0, 380, 1, True, False),  # more than 40 s late
+    ],
+)
+def test_before_the_sweep_the_first_responder_that_is_nearly_there_goes_on_though_it_will_be_late(
+    east_m: float, north_m: float, left_s: int, is_first: bool, stays: bool
+) -> None:
+    first = lane_of(LINE, TAKEN_UP_NS)
+    board = Board(LINE, first)
+    board.hear(1, Enu(first.east, first.north + 300, 0), range(1, 5), now_ns=8 * S)
+    board.tasks.bid(8 * S)
+    board.tasks.choose(8 * S)
+    assert board.tasks.survivor == 1
+    now_ns = TAKEN_UP_NS - left_s * S
+    board.tasks.merge([] if is_first else [Bid(1, 7, 0, 1, 0)], now_ns=now_ns)
+    board.own_motion.position = Enu(first.east + east_m, first.north + north_m, UP_M)
+    board.tasks.choose(now_ns)
+    assert (board.tasks.survivor == 1) is stays
 
 
 @pytest.mark.parametrize("is_placed", [True, False])

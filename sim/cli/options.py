@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from fanet_mw.gateway.gateway import Doors
     from fanet_mw.hosts.realtime import SwarmAddress
     from fanet_mw.scenario import Scenario
+    from sim.cli.out_folder import OutFolder
     from sim.observation.bus_feed import BusFeed
 
 _err = Console(stderr=True)
@@ -147,7 +148,7 @@ class OutputFlags:
     """Write a page of the run with pictures into that folder, report.html and report.md."""
 
     @contextmanager
-    def prepared(self) -> Iterator[None]:
+    def prepared(self) -> "Iterator[OutFolder]":
         """Check before a run that its result can be written, and keep its folder; raises ConfigError."""
         if self.out is None and self.report:
             raise ConfigError("--report: needs --out DIR, the folder that report.html goes to")
@@ -157,12 +158,10 @@ class OutputFlags:
             raise ConfigError("--pcap: needs --out DIR, the folder that air.pcap goes to")
         if self.record is not None:
             self._prepare_recording(self.record)
-        from sim.cli.out_folder import alone, prepare
+        from sim.cli.out_folder import OutFolder, alone
 
         with alone(self.out):
-            if self.out is not None:
-                prepare(self.out, force=self.force)
-            yield
+            yield OutFolder(self.out, force=self.force)
 
     def _prepare_recording(self, path: Path) -> None:
         from sim.recording.mcap_recording import opened_alone  # what is missing is said before the run, not after it

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from sim.recording.mcap_recording import McapRecording
     from sim.results.outcome import Outcome
     from sim.run.collecting.running_tally import Progress
+    from sim.run.launcher.swarm import SwarmRun
 
 _WORD_EVERY_S = 10.0
 """The interval of the lines that say how a run fares where no terminal shows a progress bar."""
@@ -57,35 +58,40 @@ def _simulate(chosen: "Scenario", output: OutputFlags) -> int:
     from emulator.pcap_file import PcapFile
     from fanet_mw.hosts import interrupts
     from sim.cli.foreign_parts import own_output
-    from sim.results.files import begun
     from sim.run.virtual import EPOCH_UNIX_NS
     from sim.run.virtual import simulate as run
 
-    with output.prepared():
+    with output.prepared() as folder:
         print_notes(chosen)
         compile_kernel(say)
         signals: list[int] = []
-        path = output.capture_path()
-        capture = PcapFile(path, chosen.radio, receptions=output.pcap_receptions) if path else nullcontext()
-        with (
-            own_output(json=output.json),
-            begun(output.out),
-            _simulated(chosen, quiet=output.json) as (tell, watcher),
-            capture as file,
-            _recording(chosen, output.record, epoch_unix_ns=EPOCH_UNIX_NS) as recording,
-            interrupts.handed_to(signals.append),
-        ):
-            if file is not None:
-                file.pcap.epoch_unix_ns = EPOCH_UNIX_NS
-            outcome = run(
-                chosen,
-                on_progress=tell,
-                capture=file.pcap if file else None,
-                signals=signals,
-                spool_folder=output.out,
-                observer=_together(watcher, recording),
-                on_failure=_say_failure,
-            )
+        with folder.held():
+            folder.start()
+            path = output.capture_path()
+            capture = PcapFile(path, chosen.radio, receptions=output.pcap_receptions) if path else nullcontext()
+            with (
+                own_output(json=output.json),
+                _simulated(chosen, quiet=output.json) as (tell, watcher),
+                capture as file,
+                _recording(chosen, output.record, epoch_unix_ns=EPOCH_UNIX_NS) as recording,
+                interrupts.handed_to(signals.append),
+            ):
+                if file is not None:
+                    file.pcap.epoch_unix_ns = EPOCH_UNIX_NS
+
+                def follow(seconds: float) -> None:
+                    folder.replace()
+                    tell(seconds)
+
+                outcome = run(
+                    chosen,
+                    on_progress=follow,
+                    capture=file.pcap if file else None,
+                    signals=signals,
+                    spool_folder=output.out,
+                    observer=_together(watcher, recording),
+                    on_failure=_say_failure,
+                )
         why = None if recording is None else recording.failure
         return finish(outcome, output, {} if why is None else {str(output.record): why})
 
@@ -130,7 +136,6 @@ def launch(
 
     from fanet_mw.bus.topics import Topics
     from sim.cli.foreign_parts import own_output
-    from sim.results.files import begun
     from sim.run.launcher.leads import fitted
     from sim.run.launcher.swarm import launch as run
     from sim.world.possible_world import require_possible
@@ -151,7 +156,7 @@ def launch(
         if not no_world:
             raise ConfigError("--autopilots: needs --no-world, because flight controllers are the world then")
         beside.append(["autopilots", autopilots, "--flavor", doors.flavor])
-    with output.prepared():
+    with output.prepared() as folder:
         # another's world has the scenario as it is
         chosen, leads = (chosen, None) if no_world else fitted(chosen, say)
         print_notes(chosen)
@@ -159,10 +164,19 @@ def launch(
         warn_of(connect, listens=False)
         with (
             own_output(json=output.json),
-            begun(output.out),
+            folder.held(),
             Companions(beside) as companions,
             _watched(chosen, bar=not output.json) as tell,
         ):
+
+            def start(run: "SwarmRun") -> None:
+                folder.start()
+                companions.start(run.address, chosen)
+
+            def follow(at: "Progress") -> None:
+                folder.replace()
+                tell(at)
+
             outcome = asyncio.run(
                 run(
                     chosen,
@@ -175,10 +189,10 @@ def launch(
                     zenoh_config=zenoh_config,
                     emulator_options={"pcap": output.capture_path(), "receptions": output.pcap_receptions},
                     spool_folder=output.out,
-                    on_progress=tell,
+                    on_progress=follow,
                     on_event=say,
                     leads=leads,
-                    on_started=lambda run: companions.start(run.address, chosen),
+                    on_started=start,
                     awaited=companions.awaited,
                 )
             )

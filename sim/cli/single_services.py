@@ -40,18 +40,25 @@ def router(
 
     chosen = choice.realtime_scenario(scenario)
     output = OutputFlags(out=out, force=force)
-    with output.prepared():
+    with output.prepared() as folder:
         warn_of(listen, listens=True)
-        outcome = loop.run(
-            serve(
-                chosen,
-                swarm=swarm or chosen.name,
-                listen=listen,
-                out=out,
-                zenoh_config=zenoh_config,
-                on_event=tell,
+
+        def begin() -> None:
+            folder.start()
+            folder.replace()
+
+        with folder.held():
+            outcome = loop.run(
+                serve(
+                    chosen,
+                    swarm=swarm or chosen.name,
+                    listen=listen,
+                    out=out,
+                    zenoh_config=zenoh_config,
+                    on_event=tell,
+                    on_begun=begin,
+                )
             )
-        )
         return 0 if outcome is None else finish(outcome, output)
 
 

@@ -11,7 +11,7 @@ import contextlib
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -67,19 +67,6 @@ def forget(out: Path) -> None:
     for name in (*RESERVED, SUMMARY_FILE):
         with contextlib.suppress(OSError):
             (out / name).unlink()
-
-
-@contextlib.contextmanager
-def begun(out: Path | None) -> Iterator[None]:
-    """`begin`, and `forget` if the run raises."""
-    if out is not None:
-        begin(out)
-    try:
-        yield
-    except BaseException:
-        if out is not None:
-            forget(out)
-        raise
 
 
 def finish(

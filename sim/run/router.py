@@ -45,11 +45,12 @@ async def serve(
     swarm: str,
     listen: str,
     on_event: Tell,
+    on_begun: Callable[[], None] = lambda: None,
     out: Path | None = None,
     zenoh_config: Path | None = None,
 ) -> "Outcome | None":
-    """Serve the bus and the clock until the scenario is over; with `out`, a folder for temporary files, return what the
-    services did, also what they did until a signal. Raises BusError when it cannot listen.
+    """Serve the bus and the clock, which `on_begun` is told of, until the scenario is over; with `out`, a folder for
+    temporary files, return what the services did, also until a signal. Raises BusError when it cannot listen.
     """
     listen = with_port(listen)
     with contextlib.ExitStack() as held:
@@ -73,6 +74,7 @@ async def serve(
             clock, ran_s = SwarmClock(running), time.monotonic()
             pauses.restart()
             on_event("all are there: the clock runs")
+            on_begun()
             signaled: asyncio.Future[int] = asyncio.get_running_loop().create_future()
             aborted, ended_ns = None, None
             with heeding(partial(_settle, signaled)) if collector else contextlib.nullcontext():

@@ -3,16 +3,21 @@
 import contextlib
 import json
 import os
+import re
+import socket
 import struct
+from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from fanet_mw import tlog
-from fanet_mw.errors import ConfigError
+from fanet_mw.errors import ConfigError, FanetError
 from sim.cli.app import app
-from sim.cli.out_folder import alone, prepare
+from sim.cli.out_folder import OutFolder, alone
 from sim.results.file_names import PAGES, RUN_FILES
+from sim.results.files import forget
 
 SHORT = ("--set", "duration_s=1", "--set", "warmup_s=0", "--set", "drain_s=0", "--json")
 
@@ -20,6 +25,28 @@ SHORT = ("--set", "duration_s=1", "--set", "warmup_s=0", "--set", "drain_s=0", "
 def fanet(*arguments: str) -> int:
     code: int = app([*arguments, *SHORT], result_action="return_value")
     return code
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+@pytest.fixture
+def earlier(tmp_path: Path) -> Path:
+    """A folder that holds an earlier result with its pictures and captures, and a file of somebody."""
+    out = tmp_path / "earlier"
+    (out / "pictures").mkdir(parents=True)
+    for name in (*RUN_FILES, *PAGES, "air.pcap", "air-2.pcap", "pictures/quick-1-delays.svg", "notes.txt"):
+        (out / name).write_text(f"{name} of the earlier run")
+    return out
+
+
+def replaced(out: Path) -> None:
+    """What an earlier run has left makes room, and no run takes it."""
+    folder = OutFolder(out, force=True)
+    folder.start()
+    folder.replace()
+    forget(out)
 
 
 @pytest.fixture
@@ -51,7 +78,7 @@ def test_a_link_to_a_folder_that_does_not_exist_says_so(tmp_path: Path, never_ru
 def test_a_folder_without_the_right_to_write_is_refused(tmp_path: Path) -> None:
     tmp_path.chmod(0o500)
     with pytest.raises(ConfigError, match="Permission denied"):
-        prepare(tmp_path, force=True)
+        OutFolder(tmp_path, force=True)
 
 
 def test_a_used_folder_is_refused_and_replaced_whole_with_force(
@@ -79,8 +106,8 @@ def test_a_used_folder_is_refused_and_replaced_whole_with_force(
 def test_one_file_of_another_run_is_enough_to_refuse(tmp_path: Path, name: str) -> None:
     (tmp_path / name).touch()
     with pytest.raises(ConfigError, match=name):
-        prepare(tmp_path, force=False)
-    prepare(tmp_path, force=True)
+        OutFolder(tmp_path, force=False)
+    replaced(tmp_path)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -97,14 +124,72 @@ def test_force_removes_the_pictures_of_the_earlier_page_and_nothing_else_beside_
     pictures.mkdir()
     for name in ("quick-1-delays.svg", "mine.png"):
         (pictures / name).touch()
-    prepare(tmp_path, force=True)
+    replaced(tmp_path)
     assert [path.name for path in pictures.iterdir()] == ["mine.png"]
     (pictures / "mine.png").unlink()
     (pictures / "quick-1-delays.svg").touch()
     with pytest.raises(ConfigError, match=r"holds the result of another run \(quick-1-delays\.svg\)"):
-        prepare(tmp_path, force=False)
-    prepare(tmp_path, force=True)
+        OutFolder(tmp_path, force=False)
+    replaced(tmp_path)
     assert not pictures.exists()
+
+
+@pytest.mark.parametrize("command", ["launch", "router"])
+def test_an_endpoint_that_cannot_be_had_costs_no_earlier_result(command: str, earlier: Path) -> None:
+    before = contents(earlier)
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        listen = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
+        with pytest.raises(FanetError, match=re.escape(listen)):
+            app([command, "quick", "--listen", listen, "--out", str(earlier), "--force"], result_action="return_value")
+    keys = ("--zenoh-config", str(earlier / "notes.txt"))
+    with pytest.raises(FanetError, match=r"notes\.txt"):
+        app([command, "quick", *keys, "--out", str(earlier), "--force"], result_action="return_value")
+    assert contents(earlier) == before
+
+
+@pytest.mark.parametrize("command", ["simulate", "launch"])
+def test_a_run_that_ends_before_its_time_begins_costs_no_earlier_result(
+    command: str, earlier: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = contents(earlier)
+
+    def simulated(*_: object, **__: object) -> None:
+        assert not json.loads((earlier / "summary.json").read_text())["valid"], "the new run has its own"
+        raise ZeroDivisionError
+
+    async def launched(*_: object, on_started: Callable[[object], None], **__: object) -> None:
+        assert contents(earlier) == before
+        on_started(SimpleNamespace(address=None))
+        (earlier / "air.pcap").write_bytes(b"of the new run")
+        simulated()
+
+    monkeypatch.setattr("sim.run.virtual.simulate", simulated)
+    monkeypatch.setattr("sim.run.launcher.swarm.launch", launched)
+    with pytest.raises(ZeroDivisionError):
+        fanet(command, "quick", "--pcap", "--out", str(earlier), "--force")
+    assert contents(earlier) == before
+
+
+def test_an_earlier_result_is_gone_once_the_time_of_a_run_has_begun(
+    earlier: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def simulated(*_: object, on_progress: Callable[[float], None], **__: object) -> None:
+        on_progress(0.1)
+        assert not (earlier / ".earlier").exists()
+        raise ZeroDivisionError
+
+    monkeypatch.setattr("sim.run.virtual.simulate", simulated)
+    with pytest.raises(ZeroDivisionError):
+        fanet("simulate", "quick", "--out", str(earlier), "--force")
+    assert [*contents(earlier)] == ["notes.txt"]
+
+
+def test_what_a_killed_run_had_set_aside_is_found_by_the_next_one(earlier: Path) -> None:
+    before = contents(earlier)
+    OutFolder(earlier, force=True).start()
+    with pytest.raises(ConfigError, match="holds the result of another run"):
+        OutFolder(earlier, force=False)
+    assert contents(earlier) == before
 
 
 @pytest.mark.parametrize("command", ["simulate", "launch"])

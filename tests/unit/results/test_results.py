@@ -15,9 +15,9 @@ import pytest
 from fanet_mw import tlog
 from fanet_mw.errors import ConfigError
 from fanet_mw.whole_file import write_items
-from sim.cli.out_folder import prepare
+from sim.cli.out_folder import OutFolder
 from sim.results.file_names import RUN_FILES
-from sim.results.files import begin, begun, finish
+from sim.results.files import begin, finish, forget
 from sim.results.outcome import Outcome
 from sim.results.run_folder import RunFolder
 from sim.run.virtual import simulate
@@ -105,7 +105,10 @@ def test_a_run_that_is_killed_while_it_writes_is_no_result(outcome: Outcome, tmp
             assert not summary["valid"]
             with pytest.raises(ConfigError, match="did not end"):
                 RunFolder(out)
-            prepare(out, force=True)
+            folder = OutFolder(out, force=True)
+            folder.start()
+            folder.replace()
+            forget(out)
             assert list(out.iterdir()) == []
         else:
             assert signaled == 0
@@ -121,7 +124,10 @@ def test_a_run_begins_where_another_one_was_broken_off_and_leaves_nothing_if_it_
     found = {}
 
     def run() -> None:
-        with begun(out):
+        folder = OutFolder(out, force=True)
+        with folder.held():
+            folder.start()
+            folder.replace()
             found.update({path.name: path.read_bytes() for path in out.iterdir()})
             raise ZeroDivisionError
 

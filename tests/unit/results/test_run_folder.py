@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from fanet_mw.errors import ConfigError
-from sim.cli.out_folder import prepare
+from sim.cli.out_folder import OutFolder
 from sim.report import page, replay_page
 from sim.results.files import begin, finish
 from sim.results.replay import Replay
@@ -251,8 +251,10 @@ def test_force_removes_nothing_behind_a_link(tmp_path: Path) -> None:
     (out / "pictures").symlink_to(elsewhere)
     (out / "trace.jsonl").symlink_to(tmp_path / "nothing")
     with pytest.raises(ConfigError, match=r"trace\.jsonl"):
-        prepare(out, force=False)
-    prepare(out, force=True)
+        OutFolder(out, force=False)
+    folder = OutFolder(out, force=True)
+    folder.start()
+    folder.replace()
     assert (elsewhere / "quick-1-links.png").exists()
     assert not os.path.lexists(out / "trace.jsonl")
 

@@ -33,7 +33,7 @@ from fanet_mw.bus.messages import (
     TxStatus,
 )
 from fanet_mw.bus.topics import Topics
-from fanet_mw.extensions import load
+from fanet_mw.extensions import make
 from fanet_mw.geodesy import Geodetic
 from fanet_mw.motion import Motion
 from fanet_mw.node.node import Node
@@ -329,4 +329,4 @@ def _loads(scenario: Scenario, node: NodeId) -> Sequence[Application]:
 def _foreign(scenario: Scenario, node: NodeId) -> Sequence[Application]:
     """The applications of other packages that a scenario asks for."""
     entries = [entry for entry in scenario.applications if entry.on(node)]
-    return [load("applications.use", entry.use)(scenario, node, entry.options) for entry in entries]
+    return [make("applications.use", entry.use, scenario, node, entry.options) for entry in entries]

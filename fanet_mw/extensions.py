@@ -29,7 +29,8 @@ from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler, Vali
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import core_schema
 
-from fanet_mw.part_failure import OURS, exits_raised
+from fanet_mw.errors import ConfigError
+from fanet_mw.part_failure import OURS, exits_raised, said_at
 
 GROUPS: Final[Mapping[str, str]] = {
     "routing.protocol": "fanet_mw.routing",
@@ -51,6 +52,15 @@ _METHODS: Final[Mapping[str, Sequence[str]]] = {
     "applications.use": ("start", "on_message", "wake", "next_wake_ns", "report"),
 }
 """The methods by which a class of each kind is recognized."""
+_MADE_WITH: Final[Mapping[str, str]] = {
+    "routing.protocol": "(port)",
+    "mobility.model": "(starts, scenario)",
+    "clusters.method": "(count=, range_m=, options=)",
+    "radio.channel": "(radio)",
+    "applications.use": "(scenario, node, options)",
+}
+"""What a class of each kind is made with."""
+_LONGEST: Final = 300
 AS_TEXT: Final[Mapping[str, bool]] = {"imports": False}
 """The context of pydantic in which names of parts of other packages are taken as they are."""
 _NOT_EVERYWHERE: Final = ("numpy", "numba")
@@ -164,6 +174,22 @@ def load(key: str, name: str) -> Any:  # noqa: ANN401  (whatever the contract of
     if not _is_part(key, found):
         raise ValueError(f"{key} = {name!r}: {text} is no class with {_methods(key)}")
     return found
+
+
+def make(key: str, name: str, *arguments: object, **named: object) -> Any:  # noqa: ANN401
+    """The part that a scenario names, made with the arguments of its contract; ConfigError if its class cannot be."""
+    part = load(key, name)
+    try:
+        return part(*arguments, **named)
+    except (Exception, SystemExit) as error:
+        offered = f"the entry point of {GROUPS[key]} for " if name in installed(key) else ""
+        what = f"{key} = {name!r}: {offered}{part.__module__}:{part.__qualname__}"
+        raised = " ".join(f"{type(error).__name__}: {error}".split()).removesuffix(":")[:_LONGEST]
+        if (where := said_at(error)) is None:
+            why = f"cannot be made with {_MADE_WITH[key]}: {raised}"
+        else:
+            why = f"has raised {raised}, at {where}, when it was made"
+        raise ConfigError(f"{what} {why}") from error
 
 
 def _is_part(key: str, found: object) -> bool:

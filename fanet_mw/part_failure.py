@@ -46,6 +46,18 @@ def said_of(error: BaseException, foreign_modules: Collection[str], actors: Sequ
     return f"{_module(frame)}:{frame.f_code.co_qualname} ({where}) has raised {why}"
 
 
+def said_at(error: BaseException) -> str | None:
+    """File and line of a foreign module where an error was raised that the caller has caught; None if it was at the
+    call itself, which the called function does not take.
+    """
+    found = [(frame, line) for frame, line in traceback.walk_tb(error.__traceback__)][1:]
+    foreign = [at for at in found if _module(at[0]).partition(".")[0] not in OURS]
+    if not found:
+        return None
+    frame, line = (foreign or found)[-1]
+    return f"{frame.f_code.co_filename}:{line}"
+
+
 def _module(frame: FrameType) -> str:
     return str(frame.f_globals.get("__name__", ""))
 

@@ -23,7 +23,7 @@ from emulator.channel.path_loss import (
 )
 from emulator.kernel.state import Reals
 from fanet_mw.errors import LocalProtocolError
-from fanet_mw.extensions import load
+from fanet_mw.extensions import make
 from fanet_mw.scenario.tables.radio import CHANNELS, UMA_ANTENNA_M, Radio, default_sensitivity_dbm, noise_dbm
 
 
@@ -168,5 +168,5 @@ def _checked(loss_db: object, count: int, radio: Radio) -> Reals:
 
 
 def _foreign(radio: Radio) -> Channel:
-    channel: Channel = load("radio.channel", radio.channel)(radio)
+    channel: Channel = make("radio.channel", radio.channel, radio)
     return channel

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Final
 
-from fanet_mw.extensions import load
+from fanet_mw.extensions import load, make
 from fanet_mw.node.contract import Port, RoutingProtocol
 
 Maker = Callable[[Port], RoutingProtocol]
@@ -41,4 +41,6 @@ def maker_of(name: str) -> Maker:
 
 def make_protocol(port: Port) -> RoutingProtocol:
     """The protocol that the scenario of this port names."""
-    return maker_of(port.scenario.routing.protocol)(port)
+    name = port.scenario.routing.protocol
+    made: RoutingProtocol = maker_of(name)(port) if name in MAKERS else make("routing.protocol", name, port)
+    return made

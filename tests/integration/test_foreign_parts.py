@@ -2,6 +2,7 @@
 
 import json
 import pickle
+import sys
 from pathlib import Path
 
 import pytest
@@ -175,6 +176,80 @@ def test_what_a_part_computes_is_checked_where_it_enters(
         simulate(scenario)
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+UNMADE = """
+import sys
+from fanet_mw.application import Application
+from fanet_mw.routing.flooding import Flooding
+class Deaf(Flooding):
+    def __init__(self): pass
+class Broken(Flooding):
+    def __init__(self, port):
+        self.table = {}[port.node]
+class Leaving(Flooding):
+    def __init__(self, port): sys.exit(0)
+class Kept(Flooding):
+    def __init__(self, port): super().__init__(port, 7)
+class Cells:
+    def __init__(self, count): pass
+    def divide(self, swarm): pass
+class Track:
+    def __init__(self, starts): pass
+    def track(self, t_s): pass
+class Loss:
+    def __init__(self, radio, more): pass
+    def loss_db(self, distance_m, from_m, to_m): pass
+    def reach_m(self, budget_db): pass
+class Finder(Application):
+    name = "finder"
+    def __init__(self, scenario, node): pass
+"""
+
+
+@pytest.mark.parametrize(
+    ("key", "name", "said"),
+    [
+        (
+            "routing.protocol",
+            "parts:Deaf",
+            "parts:Deaf cannot be made with (port): TypeError: Deaf.__init__() takes 1 ",
+        ),
+        ("routing.protocol", "parts:Broken", "parts:Broken has raised KeyError: 1, at {}:9, when it was made"),
+        ("routing.protocol", "parts:Leaving", "parts:Leaving has raised SystemExit: 0, at {}:11, when it was made"),
+        ("routing.protocol", "parts:Kept", "at {}:13, when it was made"),
+        ("clusters.method", "parts:Cells", "parts:Cells cannot be made with (count=, range_m=, options=): TypeError: "),
+        ("mobility.model", "parts:Track", "parts:Track cannot be made with (starts, scenario): TypeError: "),
+        ("radio.channel", "parts:Loss", "parts:Loss cannot be made with (radio): TypeError: "),
+        ("applications.use", "parts:Finder", "parts:Finder cannot be made with (scenario, node, options): TypeE"),
+    ],
+)
+def test_a_part_that_cannot_be_made_is_named_with_its_class_and_what_is_wrong(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, key: str, name: str, said: str
+) -> None:
+    (tmp_path / "parts.py").write_text(UNMADE)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "parts", raising=False)
+    extensions.load.cache_clear()
+    change = f"applications=[{{use='{name}'}}]" if key == "applications.use" else f"{key}={name}"
+    scenario = catalog.find("quick", ["duration_s=3", "warmup_s=0", "drain_s=1", "mission.survivors=0", change])
+    with pytest.raises(ConfigError) as caught:
+        simulate(scenario)
+    assert str(caught.value).startswith(f"{key} = {name!r}: ")
+    assert said.format(tmp_path / "parts.py") in str(caught.value)
+
+
+def test_a_part_that_cannot_be_made_is_named_by_its_entry_point(
+    installed: Installed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(installed.site)
+    extensions.load.cache_clear()
+    with pytest.raises(ConfigError) as caught:
+        extensions.make("routing.protocol", "gossip3")
+    assert str(caught.value).startswith(
+        "routing.protocol = 'gossip3': the entry point of fanet_mw.routing for swarm_parts.gossip3:Gossip3 cannot be "
+        "made with (port): TypeError: "
+    )
 
 
 RAISING = """

@@ -21,7 +21,7 @@ from multiprocessing.context import ForkServerContext, ForkServerProcess
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from fanet_mw.errors import FanetError, HostError
+from fanet_mw.errors import ConfigError, FanetError, HostError
 from fanet_mw.hosts.service import BUS_EXIT_CODE
 from sim.results.outcome import described
 from sim.run.launcher import process_setup
@@ -36,6 +36,8 @@ _LAUNCHES_WHEN_IMPORTED: Final = 79
 """The exit code of a child whose import of the main program starts a swarm."""
 _MUST_COMPILE: Final = 78
 """The exit code of the first child if the emulator's kernel is not compiled yet."""
+_REFUSED: Final = 2
+"""The exit code of a child that cannot be what the scenario asks for, as that of a command."""
 _UNKNOWN_END: Final = 255
 """The exit code that multiprocessing gives a child whose server has not told one."""
 _NO_FOLDER: Final = "the working folder has been deleted, and the swarm's processes start in it"
@@ -84,7 +86,7 @@ def _child(recipe: ChildRecipe) -> None:
         code = recipe.entry(**recipe.arguments)
     except FanetError as error:
         sys.stderr.write(f"{error}\n")
-        code = BUS_EXIT_CODE
+        code = _REFUSED if isinstance(error, ConfigError) else BUS_EXIT_CODE
     sys.exit(code)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from fanet_mw.bus.messages import VELOCITY_LASTS_NS, Setpoint, SetpointKind
 from fanet_mw.errors import LocalProtocolError
-from fanet_mw.extensions import load
+from fanet_mw.extensions import make
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.tables.mobility import MOBILITY_MODELS
 from fanet_mw.units import FARTHEST_M, FASTEST_M_S, Enu, S
@@ -144,7 +144,7 @@ class Guidance:
             else RandomWaypoint(starts, scenario) if model == "random_waypoint"
             else Crossing(starts, scenario) if model == "crossing"
             else None if model in MOBILITY_MODELS
-            else _Foreign(model, load("mobility.model", model)(starts.copy(), scenario), starts)
+            else _Foreign(model, make("mobility.model", model, starts.copy(), scenario), starts)
         )  # fmt: skip
         self._commands: dict[int, _Command] = {}
         """The command of each row, the newest command last; a row without a command follows the mobility model."""

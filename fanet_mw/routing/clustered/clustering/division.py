@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, Final
 
-from fanet_mw.extensions import load
+from fanet_mw.extensions import make
 from fanet_mw.graph.topology import Adjacency, levels
 from fanet_mw.routing.clustered.clustering import Balanced, Cluster, Clustering, Swarm
 from fanet_mw.routing.clustered.clustering.bisection import among
@@ -31,7 +31,7 @@ class Division:
         self._method: Clustering = Balanced(count)
         self._count: int | None = count
         if method not in METHODS:
-            self._method = load("clusters.method", method)(count=count, range_m=range_m, options=options)
+            self._method = make("clusters.method", method, count=count, range_m=range_m, options=options)
             self._count = None if self._method.promise.dominating else count
 
     def divide(self, swarm: Swarm) -> list[Cluster]:

@@ -61,6 +61,7 @@ class SearchPlace:
         self._own_motion = own_motion
         self._reach_m, self._most_m = reach_m, _FREE_REACH * reach_m
         self._view_m = 0.0 if math.isinf(look_m) else _LOOK_SHARE * look_m
+        """How far to the side the camera is relied on; 0 for a UAV without one."""
         self._aside_m = min(_ASIDE_M, _LOOK_SHARE * look_m)
         self.plan: Search | None = None
         self.pattern: Pattern | None = None

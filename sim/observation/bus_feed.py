@@ -38,6 +38,7 @@ from sim.observation.observer import Observer
 from sim.observation.turns import MOST_SPANS
 from sim.records.bus_checks import BusChecks
 from sim.records.standing import KINDS
+from sim.records.told_faults import ToldFaults
 
 _MOST_PUTS: Final = 50_000
 _ANSWER_S: Final = 3.0
@@ -86,6 +87,7 @@ class BusFeed:
         self._waits_until_s = 0.0
         self._before: set[Record] = set()
         """The records of that answer, until what was put meanwhile has been told."""
+        self._faults = ToldFaults()
         self._puts: deque[_Put] = deque(maxlen=_MOST_PUTS)
         self._clocks: deque[bytes] = deque(maxlen=16)
         self._asked_s = 0.0
@@ -165,7 +167,7 @@ class BusFeed:
             case TraceBatch() if name in self._checks.node_of:
                 good = [record for record in message.records if self._checks.record(name, record) is None]
                 self.refused += len(message.records) - len(good)
-                observer.take_records(record for record in good if record not in self._before)
+                observer.take_records(self._faults.fresh(record for record in good if record not in self._before))
             case Report() if name in self._checks.node_of and message.name == name:
                 content, why = self._checks.report(name, message.json)
                 if why is None and makes_sense(content):

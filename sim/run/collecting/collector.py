@@ -25,6 +25,7 @@ from sim.records.bus_checks import BusChecks
 from sim.records.spool import Spool
 from sim.records.standing import Standing
 from sim.records.stored_records import RecordSpools
+from sim.records.told_faults import ToldFaults
 from sim.results.links import LinkTotals
 from sim.results.outcome import Outcome
 from sim.run.collecting.running_tally import RunningTally
@@ -70,6 +71,7 @@ class Collector:
         self._records = RecordSpools(folder)
         self.tally = RunningTally(scenario)
         self._standing = Standing()
+        self._faults = ToldFaults()
         self._taps = Spool(folder)
         self._reports: dict[str, dict[str, Any]] = {}
         self._links = LinkTotals()
@@ -138,6 +140,7 @@ class Collector:
                 good.append(record)
             else:
                 self._refused[f"trace: {why}"] += 1
+        good = self._faults.fresh(good)
         self._keep(good)
         self.tally.take_records(good)
         self._standing.take(good)

@@ -17,12 +17,14 @@ from typing import Any
 
 import pytest
 
+from emulator.medium import Medium
 from fanet_mw.bus import codecs
 from fanet_mw.bus.link_stats import COUNTS, LinkStats
 from fanet_mw.bus.messages import MavlinkTap, Message, Report, TraceBatch
 from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import ConfigError
 from fanet_mw.hosts.bus import OnSample
+from fanet_mw.scenario import config
 from fanet_mw.trace import (
     Approaching,
     Arrived,
@@ -132,6 +134,29 @@ def test_who_has_sent_no_report_for_long_is_silent_until_it_sends_the_next(ear: 
     ear.collector.begin("world", "agent-1")
     ear.now_ns = 23 * S
     assert ear.collector.silent(4 * S) == everyone - {"world", "agent-1"}
+
+
+def test_an_emulator_that_is_started_again_tells_no_planned_fault_twice(ear: Ear) -> None:
+    cuts = [{"node": 2, "at_s": 1.0, "for_s": 1.0}, {"node": 3, "at_s": 2.5}, {"node": 3, "at_s": 6.0}]
+    scenario = config.build(
+        {"nodes": {"count": 9}, "duration_s": 9, "faults": [{"kind": "cut", **one} for one in cuts]}
+    )
+
+    def lived(*, since_s: float, until_s: float) -> list[Record]:
+        medium = Medium(scenario, "swarm")
+        medium.start(round(since_s * S))
+        medium.wake(round(until_s * S))
+        return list(medium.records)
+
+    whole = lived(since_s=0, until_s=9)
+    assert len(whole) == 5, "the second of node 3 ends the first"
+    for since_s, until_s in ((0, 2), (3, 5), (5.5, 9)):  # of the fault at 2.5 s the third life could tell, too
+        for record in lived(since_s=since_s, until_s=until_s):
+            ear.say(NAMES.trace("emulator"), TraceBatch((record,)))
+    assert list(ear.outcome().records) == whole
+    assert ear.why == {}
+    standing = codecs.decode(ear.collector.standing())
+    assert [record.t_ns for record in standing[0].records] == [6 * S]
 
 
 def test_what_genuine_actors_say_passes_and_gives_the_result_of_the_run(ear: Ear, genuine: Outcome) -> None:

@@ -60,7 +60,7 @@ def sweep(
         retry: Repeat runs that failed.
         rerun_older: Repeat runs that code other than the present one has finished, so that all rows are of one code.
         dry_run: Validate, count, and stop.
-        json: Print what came out as JSON, on standard output.
+        json: Print what came out, or with --dry-run what would be run, as JSON, on standard output.
 
     """
     name, wanted = asked(what, set, seeds, variant)
@@ -99,6 +99,10 @@ def carry_out(
         say(_announcement(name, wanted, plan, workers))
         _warn_of_codes(plan.codes, "they are run again" if rerun_older else _KEPT_NOTICE)
         if dry_run:
+            if json:
+                runs = [{"case": task.case, "seed": task.seed, "command": task.command} for task in plan.todo]
+                answer = {"table": str(out / TABLE), "finished": plan.total - len(plan.todo), "to_run": runs}
+                sys.stdout.write(f"{json_module.dumps(answer)}\n")
             return 0
         if plan.todo:  # once, so that not every worker does so for itself
             compile_kernel(say)

@@ -1,5 +1,6 @@
 """What the flags of `fanet sweep` mean, typed as a user types them."""
 
+import json
 import re
 from pathlib import Path
 
@@ -31,6 +32,28 @@ def test_a_dry_run_leaves_nothing_behind(tmp_path, capsys: pytest.CaptureFixture
     assert carry_out("short", Sweep(base="quick"), out=tmp_path / "short", jobs=1, scheduler=None, dry_run=True) == 0
     assert "1 run (1 setting x 1 seed); 1 process" in capsys.readouterr().err
     assert [*tmp_path.iterdir()] == []
+
+
+def test_a_dry_run_prints_as_json_what_it_would_run(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = [
+        "sweep",
+        "quick",
+        "--set",
+        "nodes.count=5,6",
+        "--seeds",
+        "2",
+        "--dry-run",
+        "--json",
+        "--jobs",
+        "1",
+        "--out",
+    ]
+    assert app([*words, str(tmp_path)], result_action="return_value") == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert (answer["table"], answer["finished"]) == (str(tmp_path / "runs.parquet"), 0)
+    assert [(run["seed"], run["command"]) for run in answer["to_run"]] == [
+        (seed, f"fanet simulate quick --set nodes.count={count} --seed {seed}") for count in (5, 6) for seed in (1, 2)
+    ]
 
 
 @pytest.mark.slow

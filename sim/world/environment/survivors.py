@@ -12,7 +12,7 @@ from fanet_mw.scenario.model import Scenario
 from fanet_mw.units import Enu
 from sim.world.arrays import Flags, Rows, Values
 from sim.world.environment.layout import positions
-from sim.world.environment.obstacles import Box, obstacles
+from sim.world.environment.obstacles import Box, covered_by, obstacles
 
 _TRIES: Final = 200
 
@@ -25,15 +25,15 @@ def place(scenario: Scenario) -> list[Enu]:
     random = stream(scenario.seed, "survivors")
     if mission.survivors_in == "buildings" and mission.survivors:
         return _in_buildings(scenario, random)
-    boxes = _boxes(scenario) if scenario.world.has_obstacles and mission.survivors else ()
-    return [_in_the_open(random, scenario.world.area_m / 2, boxes) for _ in range(mission.survivors)]
+    inside = covered_by(_boxes(scenario) if scenario.world.has_obstacles and mission.survivors else ())
+    return [_in_the_open(random, scenario.world.area_m / 2, inside) for _ in range(mission.survivors)]
 
 
-def _in_the_open(random: Random, half_m: float, boxes: Sequence[Box]) -> Enu:
+def _in_the_open(random: Random, half_m: float, inside: Callable[[Enu], bool]) -> Enu:
     """A place outside of all buildings; any place if buildings are everywhere."""
     for _ in range(_TRIES):
         at = Enu(random.uniform(-half_m, half_m), random.uniform(-half_m, half_m), 0.0)
-        if not any(box.near(np.array([at]), margin_m=0.0) for box in boxes):
+        if not inside(at):
             break
     return at
 

@@ -2,9 +2,11 @@
 
 import json
 import math
+import time
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import numpy as np
@@ -22,7 +24,7 @@ from sim.world.engines.rotors.rigid_body import Rotors
 from sim.world.engines.rotors.vehicle_types import IRIS
 from sim.world.environment import footprints, heightmap
 from sim.world.environment.layout import positions
-from sim.world.environment.obstacles import Box, Obstacles, obstacles
+from sim.world.environment.obstacles import Box, Obstacles, covered_by, obstacles
 from sim.world.environment.solids import Solids
 from sim.world.environment.survivors import Survivors, place
 from sim.world.incidents import NoFlyEntries
@@ -37,6 +39,26 @@ PARIS = Geodetic(48.8566, 2.3522, 0.0)
 def test_survivors_are_where_the_list_says(make_scenario: MakeScenario) -> None:
     scenario = make_scenario(**{"mission.survivors": 2, "mission.survivor_positions_m": ((10, -20), (300, 40))})
     assert place(scenario) == [Enu(10, -20, 0), Enu(300, 40, 0)]
+
+
+def test_a_place_is_inside_buildings_when_it_is_inside_one_of_them() -> None:
+    random = Random(7)
+    bounds = ((-40, 40), (-40, 40), (1, 20), (1, 20), (1, 20), (-4, 4))
+    boxes = [Box(*(random.uniform(*bound) for bound in bounds)) for _ in range(30)]
+    inside, found = covered_by(boxes), []
+    for _ in range(2000):
+        at = Enu(random.uniform(-60, 60), random.uniform(-60, 60), random.uniform(0, 20))
+        found.append(any(box.near(np.array([at]), margin_m=0.0) for box in boxes))
+        assert inside(at) == found[-1]
+    assert 100 < sum(found) < 1900
+    assert not covered_by(())(Enu(0.0, 0.0, 0.0))
+
+
+def test_survivors_among_ten_thousand_buildings_have_their_places_at_once(make_scenario: MakeScenario) -> None:
+    scenario = make_scenario(**{"mission.survivors": 8, "world.buildings": 10_000, "world.area_m": 1000})
+    began_s = time.process_time()
+    assert len(place(scenario)) == 8
+    assert time.process_time() - began_s < 5, "by one building after the other it took 19 s"
 
 
 def test_survivors_in_buildings_are_within_walls(make_scenario: MakeScenario) -> None:

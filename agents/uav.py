@@ -109,7 +109,7 @@ class Uav(Actor):
     ) -> None:
         """`applications`: the user's. `hello_time`: adds time beacons. `reader`: shared by all nodes of a run."""
         topics = Topics(swarm)
-        self._post = Post(scenario) if node == scenario.post else None
+        self._post = Post(scenario, node) if node == scenario.post else None
         ordered = () if self._post is None else (topics.orders,)
         heard = (topics.radio_rx(node), topics.sensors(node), topics.operator(node), *ordered)
         super().__init__(f"agent-{node}", heard)

@@ -12,6 +12,7 @@ from agents.mission.finding.known_survivors import KnownSurvivors
 from agents.mission.finding.plausibility import Plausibility
 from agents.mission.orders import record_of
 from agents.mission.search_formation.formation_planner import pattern_of
+from agents.mission.search_formation.roll_call import RollCall
 from agents.mission.searcher import phone_model
 from fanet_mw.application import Application, Received
 from fanet_mw.node.reader import decoded
@@ -19,9 +20,9 @@ from fanet_mw.orders import Order, is_told, wrong
 from fanet_mw.scenario import Scenario
 from fanet_mw.serial_number import newer
 from fanet_mw.trace import KnownOnGround
-from fanet_mw.units import US, S, seconds_to_ns
+from fanet_mw.units import US, NodeId, S, seconds_to_ns
 from fanet_mw.wire import BIDS, FOUND, ORDER, PRIORITY_SAFETY, ROLL, SEARCH, STATUS, SURVIVOR
-from fanet_mw.wire.search_messages import ToldOrder, told_in
+from fanet_mw.wire.search_messages import Roll, ToldOrder, told_in
 from fanet_mw.wire.search_plan import Search, SearchStatus
 from fanet_mw.wire.survivors import Found, Standing
 
@@ -43,9 +44,11 @@ _REVISION_BITS = 16
 
 
 class KnownUavs:
-    """The latest status of each UAV, and the newest plan."""
+    """The latest status of each UAV, the newest plan, and who is lost by the rolls that reach the post."""
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, node: NodeId) -> None:
+        """`node`: the post itself."""
+        self._calls = RollCall(node, hello_interval_s=scenario.routing.hello_interval_s)
         self._reach_m = scenario.radio.range_m
         self._statuses: dict[int, SearchStatus] = {}
         self._plan: Search | None = None
@@ -59,14 +62,25 @@ class KnownUavs:
         if self._plan is None or newer(plan.revision, self._plan.revision, bits=_REVISION_BITS):
             self._plan = plan
 
+    def on_roll(self, roll: Roll, *, now_ns: int) -> None:
+        self._calls.on_roll(roll, self._plan, now_ns=now_ns)
+
+    def _is_lost(self, status: SearchStatus) -> bool:
+        """True if the UAV was called lost and has said nothing since."""
+        lost_ns = self._calls.lost.get(status.node)
+        return lost_ns is not None and status.t_us * US <= lost_ns
+
     def nearest(self, east_m: float, north_m: float, *, now_ns: int) -> int | None:
-        """The nearest follower that takes part in the search, otherwise the nearest UAV that does; None without any."""
+        """The nearest follower that takes part in the search, otherwise the nearest UAV that does; None without any.
+        Who is lost comes last, and before that who is silent.
+        """
         followers: set[int] = set()
         if self._plan is not None:
             places = pattern_of(self._plan, reach_m=self._reach_m).followers
             followers = {self._plan.nodes[place] for place in places if place < len(self._plan.nodes)}
         found = [
             (
+                self._is_lost(at),
                 now_ns - at.t_us * US > _SILENT_NS,
                 node not in followers,
                 math.hypot(at.position.east - east_m, at.position.north - north_m),
@@ -86,10 +100,10 @@ class Post(Application):
         SURVIVOR.msgid, SEARCH.msgid, STATUS.msgid, BIDS.msgid, FOUND.msgid, ROLL.msgid, ORDER.msgid,
     )  # fmt: skip
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, node: NodeId) -> None:
         model = phone_model(scenario)
         self.survivors = KnownSurvivors(model)
-        self._uavs = KnownUavs(scenario)
+        self._uavs = KnownUavs(scenario, node)
         self._plausibility = Plausibility(model)
         self._planned = sorted((seconds_to_ns(entry.at_s), index) for index, entry in enumerate(scenario.orders))
         self._orders = [entry.what for entry in scenario.orders]
@@ -117,6 +131,8 @@ class Post(Application):
                 self._uavs.on_status(told)
             elif isinstance(told, Search):
                 self._uavs.on_plan(told)
+            elif isinstance(told, Roll):
+                self._uavs.on_roll(told, now_ns=now_ns)
             elif isinstance(told, Found) and self._plausibility.holds(told, now_ns=now_ns):
                 self._on_found(told, now_ns)
 

@@ -93,8 +93,9 @@ def indexed(onboard_map: OnboardMap, *, margin_m: float, watch_m: float) -> MapI
     near: dict[Cell, list[Building]] = {}
     for building in onboard_map.buildings:
         for cell in _cells_within(building, margin_m, CELL_M):
-            if building.outside(*middle_of(cell))[0] <= margin_m:
-                roofs[cell] = max(roofs.get(cell, -math.inf), building.roof_m)
+            higher = building.roof_m > roofs.get(cell, -math.inf)
+            if higher and building.outside(*middle_of(cell))[0] <= margin_m:  # which takes longer
+                roofs[cell] = building.roof_m
         for tile in _cells_within(building, watch_m, TILE_M):
             near.setdefault(tile, []).append(building)
     return MapIndex(roofs, {tile: tuple(found) for tile, found in near.items()})

@@ -69,15 +69,21 @@ def kill(name: str) -> Any:
     return lambda swarm: os.kill(swarm.processes.pid(name), signal.SIGKILL)
 
 
-@pytest.fixture(autouse=True)
-def _nothing_left_behind() -> Iterator[None]:
-    yield
+def _left_behind() -> list[list[str]]:
     listing = subprocess.run(["ps", "-eo", "pid,ppid,stat,args"], capture_output=True, text=True, check=True).stdout
     rows = [line.split(None, 3) for line in listing.splitlines()]
     ours = ("multiprocessing.forkserver", "fanet test ")  # a server of children, and what a child calls itself
     forked = [row for row in rows if any(name in row[3] for name in ours) and not row[2].startswith("Z")]
     servers = {row[0] for row in forked if int(row[1]) == os.getpid()}  # ours: they stay; their children are swarms
-    left = [row for row in forked if row[1] in servers or row[1] == "1"]  # other people's runs are their own affair
+    return [row for row in forked if row[1] in servers or row[1] == "1"]  # other people's runs are their own affair
+
+
+@pytest.fixture(autouse=True)
+def _nothing_left_behind() -> Iterator[None]:
+    yield
+    ends_s = time.monotonic() + 10.0  # a server that still starts finds only then that its launcher was killed
+    while (left := _left_behind()) and time.monotonic() < ends_s:
+        time.sleep(0.2)
     assert left == []
 
 

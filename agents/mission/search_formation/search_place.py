@@ -35,8 +35,8 @@ _LAG_M: Final = 140.0
 rests.
 """
 _NEARLY_M: Final = 120.0
-"""In the sweep a UAV finishes its flight to a survivor whose estimate is this near to it and not vague, even if it has
-lost the auction meanwhile.
+"""A UAV is nearly at a survivor whose estimate is this near to it and not vague. In the sweep it finishes that flight,
+even if it has lost the auction meanwhile.
 """
 _ENDS_M: Final = 200.0
 """It does so while it is at most this far from its own place: its row waits for it, or closes ranks without it."""
@@ -187,21 +187,20 @@ class SearchPlace:
 
     def parted_ways(self, now_ns: int) -> dict[int, Motion]:
         """Before the sweep: the likely motion of each UAV of another part on the way to its place, by that place."""
-        return {} if self.plan is None else self.likely_ways(range(len(self.plan.nodes)), now_ns, of=self.sought)
+        nodes = () if self.plan is None else self.plan.nodes
+        return self.likely_ways([place for place, node in enumerate(nodes) if node in self.sought], now_ns)
 
-    def likely_ways(
-        self, places: Iterable[int], now_ns: int, *, of: Collection[int] | None = None
-    ) -> dict[int, Motion]:
+    def likely_ways(self, places: Iterable[int], now_ns: int) -> dict[int, Motion]:
         """Before the sweep: the likely motion of the UAV of each of these places on the way to it, by what it said last
-        of itself; `of`: of these UAVs only.
+        of itself.
         """
         plan, pattern, ways = self.plan, self.pattern, dict[int, Motion]()
         if plan is None or pattern is None or self.is_taken_up(now_ns):
             return ways
         for place in places:
-            node = plan.nodes[place]
-            if node in self._seen and (of is None or node in of):
-                start, seen_ns = self._seen[node]
+            seen = self._seen.get(plan.nodes[place])
+            if seen is not None:
+                start, seen_ns = seen
                 from_ns, goal = max(seen_ns, plan.start_us * US), pattern.at(place, 0.0)
                 at, velocity = _on_way(start, goal, from_ns=from_ns, to_ns=_taken_up_ns(plan), now_ns=now_ns)
                 ways[place] = Motion(at, velocity, now_ns)
@@ -260,13 +259,17 @@ class SearchPlace:
         ahead_m, aside_m = along(moves, estimate.east_m - lane.east, estimate.north_m - lane.north)
         return abs(aside_m) <= _LEASH_M + self._aside_m and -_LAG_M <= ahead_m <= _AHEAD_M
 
+    def is_nearly_at(self, estimate: Estimate | None) -> bool:
+        """True if this UAV is nearly at the place of a survivor, and the estimate is not vague."""
+        here = self._own_motion.position
+        return estimate is not None and not estimate.is_vague and estimate.distance_m(here) <= _NEARLY_M
+
     def finishes(self, estimate: Estimate | None, now_ns: int) -> bool:
         """True in the sweep if this UAV is nearly at the place of a survivor, and not too far from its own place."""
-        here = self._own_motion.position
-        if estimate is None or estimate.is_vague or not self.is_taken_up(now_ns):
+        if not self.is_nearly_at(estimate) or not self.is_taken_up(now_ns):
             return False
         most_m = _ENDS_M if self.is_settled(now_ns) else _COMES_M
-        return estimate.distance_m(here) <= _NEARLY_M and self.lane(now_ns)[0].horizontal_to(here) <= most_m
+        return self.lane(now_ns)[0].horizontal_to(self._own_motion.position) <= most_m
 
     def is_near(self, now_ns: int) -> bool:
         """True if this UAV is as near to its place as the swarm needs it to stay connected."""

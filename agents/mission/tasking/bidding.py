@@ -48,10 +48,10 @@ _ASTRAY_M: Final = 100.0
 """Before the sweep a UAV may be so far from the straight way to its place; farther if it will be there in time."""
 _LATE_S: Final = 20.0
 """A UAV is in time if it is at its place at most so long after the sweep has begun: it catches up then."""
-_NEARLY_THERE_M: Final = 120.0
-"""Before the sweep the first responder goes on to an exact place that is this near, although it will be late."""
 _MUCH_LATE_S: Final = 40.0
-"""It does so while it would be late by this time at most: what the lines leave behind they come by minutes later."""
+"""Before the sweep the first responder that is nearly at an exact place goes on while it would be late by this time at
+most: what the lines leave behind they come by minutes later.
+"""
 _GLANCE_S: Final = 8.0
 """How long a UAV is assumed to look at the place of a survivor on the way to its own."""
 _LOOKS_S: Final = 15.0
@@ -230,10 +230,9 @@ class Bidding:
         """True before the sweep for the first responder to a survivor if it is nearly at an exact place, and would not
         be much too late at its own.
         """
-        here = self._own_motion.position
-        if place is None or place.is_vague or place.distance_m(here) > _NEARLY_THERE_M or not self.is_first(now_ns):
+        if self._formation.plan is None or not self._formation.is_nearly_at(place) or not self.is_first(now_ns):
             return False
-        return self._formation.plan is not None and self._absence.late_s(here, now_ns, after_s=0.0) <= _MUCH_LATE_S
+        return self._absence.late_s(self._own_motion.position, now_ns, after_s=0.0) <= _MUCH_LATE_S
 
     def _may_look(self, place: Estimate | None, lane: Enu, moves: Enu) -> bool:
         """True if a UAV of a team may set out for an estimated place without leaving the formation: to a vague one only

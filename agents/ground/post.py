@@ -38,7 +38,7 @@ its earlier ones.
 """
 _NUMBERS: Final = 1 << 16
 _SILENT_NS: Final = 70 * S
-"""After this time without a status a UAV is chosen only if all others are as silent."""
+"""After this time without a status a UAV is chosen only if all others are as silent, or lost."""
 
 _REVISION_BITS = 16
 
@@ -72,7 +72,7 @@ class KnownUavs:
 
     def nearest(self, east_m: float, north_m: float, *, now_ns: int) -> int | None:
         """The nearest follower that takes part in the search, otherwise the nearest UAV that does; None without any.
-        Who is lost comes last, and before that who is silent.
+        UAVs that were silent for long come after all others, and lost ones after those.
         """
         followers: set[int] = set()
         if self._plan is not None:

@@ -24,7 +24,7 @@ from sim.results.file_names import PAGES, PICTURES, RESERVED, RUN_FILES, SUMMARY
 
 _MOST_SAID: Final = 8
 _ASIDE: Final = ".earlier"
-"""The folder in `--out` that holds the earlier result from the first process of a run until its time begins."""
+"""The folder in `--out` that holds the earlier result while a run starts."""
 
 
 @contextlib.contextmanager
@@ -94,9 +94,7 @@ class OutFolder:
 
     @contextlib.contextmanager
     def held(self) -> Iterator[None]:
-        """Have an earlier result back, if there is one still, when what is done meanwhile raises, for then nothing has
-        come of the run.
-        """
+        """Put the earlier result back if the run ends by an error before it has begun; otherwise remove it."""
         try:
             yield
         except BaseException:

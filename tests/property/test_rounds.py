@@ -167,6 +167,17 @@ def test_of_nodes_within_two_hops_one_owns_a_bulk_slot(timing: RoundTiming, from
     assert len(set(owned)) == len(nodes)
 
 
+@given(st.integers(0, 10**6), st.booleans(), st.lists(st.tuples(st.integers(2, 488), st.booleans()), max_size=6))
+def test_a_node_misses_none_of_its_own_slots_from_wherever_it_looks(
+    first: int, often: bool, rivals: list[tuple[int, bool]]
+) -> None:
+    timing = RoundTiming.of(config.build({"nodes": {"count": 10}, "routing": {"protocol": "rounds"}}))
+    slots, starts = BulkSlots(1, timing), [timing.slot_start_ns(first + at) for at in range(150)]
+    found = [slots.next_ns(start, in_each_slot=often, rivals=rivals) for start in starts]
+    for start, own, after in zip(starts, found, found[1:], strict=False):
+        assert own in (start, after)
+
+
 def test_a_node_with_little_to_send_owns_few_slots_and_leaves_the_others_alone() -> None:
     timing = RoundTiming.of(config.build({"nodes": {"count": 10}, "routing": {"protocol": "rounds"}}))
 

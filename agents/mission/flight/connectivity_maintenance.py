@@ -210,8 +210,8 @@ class ConnectivityMaintenance:
         return next((node for left_m, node, _ in self._unheard(now_ns) if left_m <= near_m), None)
 
     def _unheard(self, now_ns: int) -> list[tuple[float, int, Motion]]:
-        """The UAVs to which this one is tied and which it does not hear while ranks are closed: how far each would be
-        without the loss, its node, and the motion that it would have; before the sweep, where each is likely to be.
+        """The UAVs to which this one is tied and which it does not hear while ranks are closed: the distance, the node
+        and the motion of each. The motion is the one without the loss; before the sweep it is the likely one.
         """
         plan, pattern, place = self._formation.plan, self._formation.pattern, self._formation.place
         closing_s, swept_s = self._formation.closing_s(now_ns), self._formation.swept_s(now_ns)

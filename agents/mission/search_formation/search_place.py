@@ -312,8 +312,8 @@ class SearchPlace:
         self, east: float, north: float, lane: Enu, moves: Enu, now_ns: int, *, leads: bool = False, views: bool = False
     ) -> tuple[Enu, Enu]:
         """The position nearest to a point at which this UAV may be, and the velocity of that position. `leads`: it may
-        be ahead of its place, whose position and velocity are `lane` and `moves`; `views`: while its team moves it
-        leaves its lane only as far as its camera needs to show the point.
+        be ahead of its place, whose position and velocity are `lane` and `moves`; `views`: while its team moves,
+        this UAV leaves its lane only as far as its camera needs to show the point.
         """
         if self.is_free(now_ns):
             return Enu(east, north, lane.up), STILL

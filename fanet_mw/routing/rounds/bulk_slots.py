@@ -49,8 +49,8 @@ class BulkSlots:
         self._timing = timing
 
     def next_ns(self, from_ns: int, *, in_each_slot: bool, rivals: Sequence[tuple[int, bool]]) -> int:
-        """The start of the first own slot from an instant on; `rivals`: other nodes within two hops, and whether each
-        takes part in all slots, or where the last bits of its bid are 0.
+        """The start of the first own slot from an instant on, or of one much later if none is found; `rivals`: other
+        nodes within two hops, and whether each takes part in all slots or in few.
         """
         first = self._timing.slot_from(from_ns)
         block, start = divmod(first, _BLOCK)

@@ -82,11 +82,15 @@ def test_a_ground_station_that_asks_much_leaves_room_for_commands(post: tuple[Op
         relay.on_operator(by_ground_station(common.MAVLink_param_request_list_message(uav, 1)), 0)
     asked = len(air.said)
     assert asked < MOST_PER_S
+    assert asked == MOST_PER_S - 10
     for uav in range(1, 6):
         relay.on_operator(by_ground_station(arm(uav)), 0)
     assert air.said[asked:] == ["COMMAND_LONG"] * 5
     relay.on_operator(by_ground_station(common.MAVLink_param_request_list_message(45, 1)), S)
     assert air.said[asked + 5 :] == ["PARAM_REQUEST_LIST"], "what was not sent is not under way"
+    for uav in range(1, 46):
+        relay.on_operator(by_ground_station(arm(uav)), S)
+    assert len(air.said) == asked + 5 + MOST_PER_S, "commands have a limit, too"
 
 
 def test_the_post_listens_for_all_that_a_uav_may_say_first() -> None:

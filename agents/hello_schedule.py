@@ -1,7 +1,9 @@
 """Decides when a UAV sends hellos, and remembers which neighbors have recently sent one."""
 
+import math
 from typing import Final, Protocol
 
+from fanet_mw.errors import LocalProtocolError
 from fanet_mw.node.neighbors import neighbor_lifetime_ns
 from fanet_mw.node.node import AnnouncedHello, Node
 from fanet_mw.rng import stream
@@ -32,6 +34,7 @@ class HelloSchedule:
         self._lead_ns = scenario.radio.lead_ns
         self._interval_ns = seconds_to_ns(scenario.routing.hello_interval_s)
         self._lifetime_ns = neighbor_lifetime_ns(scenario.routing.hello_interval_s)
+        self._protocol = f"routing.protocol = {scenario.routing.protocol!r}"
         self._random = stream(scenario.seed, "hello", node.node).random
         self._next_ns: int | None = None
         self._heard_ns: dict[NodeId, int] = {}
@@ -57,7 +60,10 @@ class HelloSchedule:
         else:
             time.announced(self._node.say_hello(inner, start_ns=start_ns, now_ns=now_ns, time=time.frames()))
         vary = 1 + _JITTER * (2 * self._random() - 1)
-        step_ns = int(self._interval_ns * vary * self._node.hello_share(now_ns=now_ns))
+        share = self._node.hello_share(now_ns=now_ns)
+        if not 0 < share < math.inf:
+            raise LocalProtocolError(f"{self._protocol}: hello_share() = {share!r} must be a number above 0")
+        step_ns = int(self._interval_ns * vary * share)
         self._next_ns = self._node.hello_due_ns(max(self._next_ns + step_ns, now_ns))
 
     def on_hello(self, sender: NodeId, now_ns: int) -> None:

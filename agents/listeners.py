@@ -3,9 +3,7 @@
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple, Self
 
-from agents.submission import MOST_PORT, is_port
 from fanet_mw.application import ANY, Application
-from fanet_mw.errors import LocalProtocolError
 from fanet_mw.wire import CHUNK
 
 
@@ -44,10 +42,6 @@ class Listeners:
             for message_id in application.listens if application.listens != ANY else ():
                 self._to_message.setdefault(message_id, []).append(application)
             for port in application.ports if application.ports != ANY else ():
-                if not is_port(port):
-                    raise LocalProtocolError(
-                        f"application {application.name!r}: ports has {port!r}, must be numbers in [1, {MOST_PORT}]"
-                    )
                 self._to_port.setdefault(port, []).append(application)
 
     def of_message(self, message_id: int) -> Sequence[Application]:

@@ -10,13 +10,13 @@ The last command of each application counts, and no other application may object
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import partial
 from random import Random
 from typing import Any, Final
 
+from agents.application_check import require_application, said
 from agents.listeners import Callbacks, Listeners
 from agents.messenger import Messenger
-from agents.submission import Sending, Submission, positive, priority_of
+from agents.submission import Sending, Submission, positive, priority_of, require_frames
 from fanet_mw import wire
 from fanet_mw.actor import require_instant
 from fanet_mw.application import Application, Course, Destination, Received
@@ -24,10 +24,10 @@ from fanet_mw.bus.messages import Gps, SensorReading
 from fanet_mw.errors import DropReason, LocalProtocolError, MalformedFrameError
 from fanet_mw.node.node import Node
 from fanet_mw.node.packet import Packet
-from fanet_mw.part_failure import report_of
+from fanet_mw.part_failure import is_ours, report_of
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import Record
+from fanet_mw.trace import Record, require_record
 from fanet_mw.units import BROADCAST, US, Enu, NodeId
 
 _OF_MESSENGER: Final = {
@@ -51,6 +51,8 @@ class Onboard:
         tap: Callable[[bytes, int], None],
     ) -> None:
         """`vehicle` gives position and velocity; `fly` and `tap` take a course or frames, and an instant."""
+        for application in applications:
+            require_application(application)
         names = [application.name for application in applications]
         if len(set(names)) < len(names):
             raise LocalProtocolError(f"applications {names} of node {node.node}: each name must be there once")
@@ -152,9 +154,15 @@ class Onboard:
         for application in self._callbacks.on_sensor:
             application.on_sensor(reading, now_ns)
 
-    def hello_frames(self, now_ns: int) -> bytes:
-        """The inner frames that applications add to the next hello."""
-        return b"".join(application.hello_frames(now_ns) for application in self._callbacks.hello_frames)
+    def hello_frames(self, room: int, now_ns: int) -> bytes:
+        """The inner frames that applications add to the next hello, at most `room` bytes."""
+        added = b""
+        for application in self._callbacks.hello_frames:
+            frames = application.hello_frames(now_ns)
+            if not is_ours(application) and frames != b"":
+                require_frames(frames, most=room - len(added), who=f"{said(application)}: hello_frames()")
+            added += frames
+        return added
 
     # --- time -----------------------------------------------------------------------------------------------------
 
@@ -174,7 +182,7 @@ class Onboard:
         for timed in self._callbacks.next_wake_ns:
             wake_ns = timed.next_wake_ns()
             if wake_ns is not None and wake_ns.__class__ is not int:  # NaN would be lost among the others
-                require_instant(wake_ns, who=f"application {timed.name!r} of node {self.node.node}")
+                require_instant(wake_ns, who=f"{said(timed)} of node {self.node.node}")
             if wake_ns is not None and (first_ns is None or wake_ns < first_ns):
                 first_ns = wake_ns
         return first_ns
@@ -221,7 +229,6 @@ class _ApplicationPort:
         self._sending = Sending(onboard.node.node, onboard.node.scenario.node_count)
         self.node: NodeId = onboard.node.node
         self.scenario: Scenario = onboard.node.scenario
-        self.record: Callable[[Record], None] = partial(onboard.record, application)
 
     @property
     def position(self) -> Enu:
@@ -260,11 +267,18 @@ class _ApplicationPort:
     def fly(self, course: Course) -> None:
         if not isinstance(course, Course) or not _is_flyable(course):
             raise LocalProtocolError(
-                f"application {self._application.name!r}: course = {course!r} must be a Course of finite numbers"
+                f"{said(self._application)}: course = {course!r} must be a Course of finite numbers"
             )
         self._onboard.command(self._application, course)
 
+    def record(self, record: Record) -> None:
+        if not is_ours(self._application):
+            require_record(record, who=said(self._application))
+        self._onboard.record(self._application, record)
+
     def tap(self, frames: bytes) -> None:
+        if not is_ours(self._application):
+            require_frames(frames, who=f"{said(self._application)}: tap()")
         self._onboard.tap(frames, self._onboard.now_ns)
 
     def stream(self, use: str) -> Random:

@@ -8,6 +8,7 @@ from functools import lru_cache
 from typing import Final, NamedTuple
 
 from fanet_mw import mavlink, wire
+from fanet_mw.actor import is_whole
 from fanet_mw.application import Data, Destination
 from fanet_mw.errors import LocalProtocolError, MalformedFrameError
 from fanet_mw.units import BROADCAST, NodeId
@@ -86,6 +87,19 @@ def _as_frames(content: bytes) -> bytes:
     return content
 
 
+def require_frames(frames: object, *, who: str, most: int | None = None) -> None:
+    """Raise LocalProtocolError for what is no whole MAVLink frames, or longer than `most` bytes."""
+    if not isinstance(frames, bytes):
+        raise LocalProtocolError(f"{who}: MAVLink 2 frames must be bytes, not {frames!r:.80}")
+    if most is not None and len(frames) > most:
+        raise LocalProtocolError(f"{who}: {len(frames)} bytes must be <= {most}")
+    try:
+        for _ in wire.frames(frames):
+            pass
+    except MalformedFrameError as error:
+        raise LocalProtocolError(f"{who}: {error}") from error
+
+
 def priority_of(priority: str | int) -> int:
     """The number of a priority, given by name or by number."""
     number = _PRIORITIES.get(priority)
@@ -97,6 +111,6 @@ def priority_of(priority: str | int) -> int:
 
 def positive(name: str, duration_ns: int | None) -> int | None:
     """A duration, which must be positive; None if the application states none."""
-    if duration_ns is not None and duration_ns <= 0:
-        raise LocalProtocolError(f"{name} = {duration_ns} must be above 0")
+    if duration_ns is not None and not (is_whole(duration_ns) and duration_ns > 0):
+        raise LocalProtocolError(f"{name} = {duration_ns!r} must be a whole number of ns above 0")
     return duration_ns

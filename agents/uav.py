@@ -42,6 +42,7 @@ from fanet_mw.orders import Order
 from fanet_mw.routing import make_protocol
 from fanet_mw.scenario import Scenario
 from fanet_mw.units import Enu, NodeId, earliest, seconds_to_ns
+from fanet_mw.wire import HEADER_BYTES
 
 _REPEATS: Final = 3
 """How often a setpoint is repeated within the time after which a silent computer counts as dead."""
@@ -156,6 +157,7 @@ class Uav(Actor):
         )
         self._setpoints = Setpoints(scenario)
         self._hellos = HelloSchedule(scenario, self._node, hello_time)
+        self._hello_room = scenario.radio.max_frame_bytes - HEADER_BYTES
         self._own_wake_ns: int | None = None
         """The instant at which an application or a hello is due; it may change whenever an application is called."""
         self._malformed = 0
@@ -265,7 +267,8 @@ class Uav(Actor):
     def _say_hello(self, now_ns: int) -> None:
         due_ns = self._hellos.due_ns()
         if due_ns is not None and due_ns <= now_ns:
-            self._hellos.say(self._streams.beacon_frames(now_ns) + self._onboard.hello_frames(now_ns), now_ns)
+            beacon = self._streams.beacon_frames(now_ns)
+            self._hellos.say(beacon + self._onboard.hello_frames(self._hello_room - len(beacon), now_ns), now_ns)
 
     # --- after every input ----------------------------------------------------------------------------------------
 

@@ -70,7 +70,12 @@ class Actor(ABC):
         return {}
 
 
+def is_whole(number: object) -> bool:
+    """True for what has the type of a whole number, numpy's among them."""
+    return isinstance(number, Integral)
+
+
 def require_instant(wake_ns: object, *, who: str) -> None:
     """Raise LocalProtocolError for a wake-up at what is no whole number of nanoseconds."""
-    if not isinstance(wake_ns, Integral):
+    if not is_whole(wake_ns):
         raise LocalProtocolError(f"{who}: next_wake_ns() = {wake_ns!r} must be a whole number of ns, or None")

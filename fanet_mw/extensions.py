@@ -5,8 +5,8 @@
     [routing.options]                         the part's own table, checked by its `Options`, a pydantic model
 
 This project's own names cannot be redefined. Each named part is looked up when the scenario is read; anything but a
-class with the methods of its contract is refused without being called. A scenario that is read with `AS_TEXT`, such as
-that of a result folder, imports nothing.
+class with the methods of its contract, which take what it names, is refused without being called
+(`part_signature.py`). A scenario that is read with `AS_TEXT`, such as that of a result folder, imports nothing.
 """
 
 import ast
@@ -31,6 +31,7 @@ from pydantic_core import core_schema
 
 from fanet_mw.errors import ConfigError
 from fanet_mw.part_failure import OURS, exits_raised, said_at
+from fanet_mw.part_signature import misfit
 
 GROUPS: Final[Mapping[str, str]] = {
     "routing.protocol": "fanet_mw.routing",
@@ -60,6 +61,14 @@ _MADE_WITH: Final[Mapping[str, str]] = {
     "applications.use": "(scenario, node, options)",
 }
 """What a class of each kind is made with."""
+_CONTRACTS: Final[Mapping[str, str]] = {
+    "routing.protocol": "fanet_mw.node.contract:RoutingProtocol",
+    "mobility.model": "sim.world.mobility.contract:MobilityModel",
+    "clusters.method": "fanet_mw.routing.clustered.clustering.contract:Clustering",
+    "radio.channel": "emulator.channel.link_budget:Channel",
+    "applications.use": "fanet_mw.application:Application",
+}
+"""The contract of each kind, by name: it is imported for a part alone, and some need numpy."""
 _LONGEST: Final = 300
 AS_TEXT: Final[Mapping[str, bool]] = {"imports": False}
 """The context of pydantic in which names of parts of other packages are taken as they are."""
@@ -173,7 +182,15 @@ def load(key: str, name: str) -> Any:  # noqa: ANN401  (whatever the contract of
         raise ValueError(f"{key} = {name!r}: {text} cannot be imported: {error}") from error
     if not _is_part(key, found):
         raise ValueError(f"{key} = {name!r}: {text} is no class with {_methods(key)}")
+    if (wrong := misfit(found, _contract(key))) is not None:
+        raise ValueError(f"{key} = {name!r}: {text} {wrong}")
     return found
+
+
+def _contract(key: str) -> type:
+    module, _, name = _CONTRACTS[key].partition(":")
+    contract: type = getattr(import_module(module), name)
+    return contract
 
 
 def make(key: str, name: str, *arguments: object, **named: object) -> Any:  # noqa: ANN401

@@ -37,13 +37,17 @@ def said_of(error: BaseException, foreign_modules: Collection[str], actors: Sequ
     """What `actors` were doing when one of them raised; the outermost function of a foreign module counts."""
     message = " ".join(str(error).split())[:_LONGEST]
     where = f"{', '.join(actors[:1])}, at {now_ns / S:g} s"
-    if isinstance(error, FanetError):  # its message names the part
-        return f"{message} ({where})"
-    frames = [frame for frame, _ in traceback.walk_tb(error.__traceback__)]
+    causes = [error] if error.__cause__ is None else [error, error.__cause__]
+    frames = [frame for cause in causes for frame, _ in traceback.walk_tb(cause.__traceback__)]
     foreign = [frame for frame in frames if _module(frame).partition(".")[0] in foreign_modules]
+    if isinstance(error, FanetError) and not foreign:  # its message names the part
+        return f"{message} ({where})"
     frame = (foreign or frames[-1:])[0]
+    part = f"{_module(frame)}:{frame.f_code.co_qualname}"
+    if isinstance(error, HostError):
+        return f"{message} ({where}), in {part}"
     why = f"{type(error).__name__}: {message}".removesuffix(": ")
-    return f"{_module(frame)}:{frame.f_code.co_qualname} ({where}) has raised {why}"
+    return f"{part} ({where}) has raised {why}"
 
 
 def said_at(error: BaseException) -> str | None:
@@ -88,11 +92,16 @@ def exits_raised() -> Iterator[None]:
             leave(1)
 
 
+def is_ours(part: object) -> bool:
+    """True for what a class of this project has made."""
+    return type(part).__module__.partition(".")[0] in OURS
+
+
 def report_of(part: Any) -> dict[str, Any]:  # noqa: ANN401  (an application or a protocol)
     """The counters of a part. Those of another package are told in values of JSON, numbers that are none and whatever
     else as text, so that no run is lost for its last report.
     """
-    if type(part).__module__.partition(".")[0] in OURS:
+    if is_ours(part):
         return dict(part.report())
     try:
         told = _plain(part.report(), _DEEPEST)
@@ -104,7 +113,7 @@ def report_of(part: Any) -> dict[str, Any]:  # noqa: ANN401  (an application or 
 def protocol_report_of(protocol: Any) -> dict[str, Any]:  # noqa: ANN401
     """The counters of a protocol. What one of another package calls as results call something else is renamed."""
     told = report_of(protocol)
-    if type(protocol).__module__.partition(".")[0] in OURS:
+    if is_ours(protocol):
         return told
     return {key if _may_tell(key, value) else f"protocol.{key}": value for key, value in told.items()}
 

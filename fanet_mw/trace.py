@@ -13,7 +13,7 @@ import types
 from functools import partial
 from typing import Any, Final, NamedTuple, get_args, get_type_hints
 
-from fanet_mw.errors import MalformedFrameError
+from fanet_mw.errors import LocalProtocolError, MalformedFrameError
 
 
 class Generated(NamedTuple):
@@ -406,6 +406,8 @@ _KINDS: Final[dict[str, type[Any]]] = {
 _NAMES: Final[dict[type[Any], str]] = {kind: name for name, kind in _KINDS.items()}
 DELIVERED_LINE: Final = '["delivered",%d,%d,%d,%d,%d,%d,%d]'
 """The format of the line of `Delivered`, without newline; its fields are all integers."""
+RECORDS: Final = frozenset(_NAMES)
+"""The classes of records."""
 _encoded: Final = json.JSONEncoder(separators=(",", ":")).encode
 _JSON_TYPES: Final[dict[object, tuple[type, ...]]] = {
     int: (int,),
@@ -464,6 +466,14 @@ def line(record: Record) -> str:
         return DELIVERED_LINE % record
     fields = record[:-1] if type(record) is RadioFault and not record.extent else record
     return _encoded([_NAMES[type(record)], *fields])
+
+
+def require_record(record: object, *, who: str) -> None:
+    """Raise LocalProtocolError for what no trace could hold."""
+    try:
+        parse(line(record))  # type: ignore[arg-type]
+    except (KeyError, TypeError, ValueError, MalformedFrameError) as error:
+        raise LocalProtocolError(f"{who}: record() takes a record of fanet_mw.trace, not {record!r:.120}") from error
 
 
 def parse(text: str) -> Record:

@@ -193,7 +193,14 @@ class Node:
         """
         start_ns = self._protocol.hello_start_ns(start_ns)
         most = self.scenario.radio.max_frame_bytes - wire.HEADER_BYTES
-        inner += self._protocol.hello_inner(most - len(inner), now_ns=now_ns)
+        added = self._protocol.hello_inner(most - len(inner), now_ns=now_ns)
+        if not isinstance(added, bytes) or len(added) > most - len(inner):
+            told = f"{len(added)} bytes" if isinstance(added, bytes) else f"{added!r:.80}"
+            raise LocalProtocolError(
+                f"routing.protocol = {self.scenario.routing.protocol!r}: hello_inner({most - len(inner)}) must give at "
+                f"most so many bytes, not {told}"
+            )
+        inner += added
         if time is not None and len(inner) + len(time) <= most:
             inner += time
         packet = self.port.announce(Kind.HELLO, inner, now_ns=start_ns, flags=0, hop_limit=1)

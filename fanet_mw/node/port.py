@@ -12,15 +12,16 @@ from random import Random
 from typing import Final
 
 from fanet_mw import wire
+from fanet_mw.actor import is_whole
 from fanet_mw.bus.messages import TxRequest
-from fanet_mw.errors import DropReason
+from fanet_mw.errors import DropReason, LocalProtocolError
 from fanet_mw.node.duplicates import PHASES, DuplicateSet, hash_of
 from fanet_mw.node.packet import Packet, Relay
 from fanet_mw.node.packet_numbering import PacketNumbering
 from fanet_mw.node.packet_watch import PacketWatch
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
-from fanet_mw.trace import Dropped, LetOut, Record
+from fanet_mw.trace import RECORDS, Dropped, LetOut, Record, require_record
 from fanet_mw.units import BROADCAST, STILL, Enu, NodeId
 from fanet_mw.wire import Kind
 from fanet_mw.wire.aggregation import aggregated
@@ -52,6 +53,8 @@ class NodePort:
     # --- frames ---------------------------------------------------------------------------------------------------
 
     def transmit(self, frame: bytes, dst: NodeId, start_ns: int, wants_status: bool = False, until_ns: int = 0) -> int:
+        if frame.__class__ is not bytes or start_ns.__class__ is not int or until_ns.__class__ is not int:
+            self._require_request(frame, start_ns, until_ns)
         seq = self.frames_sent
         if self._held and self._let_out(frame, seq, start_ns):
             wants_status = True
@@ -78,7 +81,11 @@ class NodePort:
         return self.transmit(self._begun(packet, flags), dst, start_ns=start_ns, wants_status=True)
 
     def relay(self, relay: Relay) -> None:
-        packet, start_ns = relay
+        try:
+            packet, start_ns = relay
+        except (TypeError, ValueError):
+            said = f"routing.protocol = {self.scenario.routing.protocol!r}"
+            raise LocalProtocolError(f"{said}: receive() must give relays, not {relay!r:.80}") from None
         self.transmit(self._relayed(packet), BROADCAST, start_ns)
 
     def relay_together(self, relays: Sequence[Relay]) -> None:
@@ -105,6 +112,8 @@ class NodePort:
         """Broadcast packets in as few frames as possible."""
         rest = iter(packets)
         for start_ns, frame, count in aggregated(packets, most_bytes=self.scenario.radio.max_frame_bytes):
+            if start_ns.__class__ is not int or until_ns.__class__ is not int:
+                self._require_request(frame, start_ns, until_ns)
             seq = self.frames_sent
             wants_status = False
             if self._held:
@@ -122,6 +131,15 @@ class NodePort:
         own = int.from_bytes(frame[wire.SEQ], "little")
         self.records.append(_new(LetOut, (start_ns, self.node, own)))
         return self.watch.announced(own, request, start_ns)
+
+    def _require_request(self, frame: object, start_ns: object, until_ns: object) -> None:
+        """Raise for what no radio can be asked, which would surface in another actor."""
+        said = f"routing.protocol = {self.scenario.routing.protocol!r} transmits"
+        if not isinstance(frame, bytes):
+            raise LocalProtocolError(f"{said} {frame!r:.80}, which must be bytes")
+        for name, instant in (("start_ns", start_ns), ("until_ns", until_ns)):
+            if not is_whole(instant):
+                raise LocalProtocolError(f"{said} with {name} = {instant!r}, which must be a whole number of ns")
 
     # --- packets --------------------------------------------------------------------------------------------------
 
@@ -149,6 +167,8 @@ class NodePort:
         self._duplicates.forget(hash_of(packet.frame))
 
     def record(self, record: Record) -> None:
+        if type(record) not in RECORDS:
+            require_record(record, who=f"routing.protocol = {self.scenario.routing.protocol!r}")
         self.records.append(record)
 
     def stream(self, use: str) -> Random:

@@ -328,3 +328,160 @@ def test_what_was_flown_until_a_part_raises_is_kept_and_said_to_have_been_ended_
     assert summary["frames"]["delivered"] > 5
     assert (tmp_path / "out" / "trace.jsonl").stat().st_size > 1000
     assert all(path.stat().st_mode & 0o600 == 0o600 for path in (tmp_path / "out").iterdir()), "they can be read"
+
+
+MISFITS = """
+from fanet_mw.application import Application
+from fanet_mw.routing.flooding import Flooding
+from fanet_mw.node.contract import RoutingProtocol
+class Waiting(Application):
+    async def on_message(self, message, now_ns): pass
+class Yielding(Application):
+    def wake(self, now_ns): yield
+class Short(Application):
+    def on_fix(self, fix): pass
+class Longer(Application):
+    def on_fix(self, fix, now_ns, more): pass
+class Lenient(Application):
+    def __init__(self, *given): pass
+    def on_fix(self, *given, more=None): pass
+class Positional(Flooding):
+    def receive(self, packet, reception, now_ns, /): pass
+class Untimed(Flooding):
+    def hello_inner(self, room): return b""
+class Partly:
+    start = originate = receive = wake = next_wake_ns = report = lambda self, *given, **named: None
+class Track:
+    def track(self): pass
+class Loss:
+    def loss_db(self, distance_m): pass
+    def reach_m(self, budget_db): pass
+class Cells:
+    def divide(self): pass
+"""
+
+
+@pytest.mark.parametrize(
+    ("key", "name", "said"),
+    [
+        ("applications.use", "Waiting", "has a method on_message that is async, and would never be awaited"),
+        ("applications.use", "Yielding", "has a method wake that is a generator, and would never run"),
+        ("applications.use", "Short", "has a method on_fix that takes (fix), and is called with (fix, now_ns)"),
+        ("applications.use", "Longer", "has a method on_fix that takes (fix, now_ns, more), and is called with (fix,"),
+        ("applications.use", "Lenient", ""),
+        ("routing.protocol", "Positional", "has a method receive that takes (packet, reception, now_ns), and is cal"),
+        ("routing.protocol", "Untimed", "has a method hello_inner that takes (room), and is called with (room, *, now"),
+        ("routing.protocol", "Partly", "lacks the method hello_inner(room, *, now_ns)"),
+        ("mobility.model", "Track", "has a method track that takes (), and is called with (t_s)"),
+        ("radio.channel", "Loss", "has a method loss_db that takes (distance_m), and is called with (distance_m, "),
+        ("clusters.method", "Cells", "has a method divide that takes (), and is called with (swarm)"),
+    ],
+)
+def test_a_method_that_cannot_be_called_as_its_contract_calls_it_is_named_when_the_scenario_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, key: str, name: str, said: str
+) -> None:
+    (tmp_path / "misfits.py").write_text(MISFITS)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "misfits", raising=False)
+    extensions.load.cache_clear()
+    part = f"misfits:{name}"
+    change = f"applications=[{{use='{part}'}}]" if key == "applications.use" else f"{key}={part}"
+    if not said:
+        catalog.find("quick", [change])
+        return
+    with pytest.raises(ConfigError) as caught:
+        catalog.find("quick", [change])
+    assert f"{part} {said}" in str(caught.value)
+
+
+WRONG = """
+import math
+from fanet_mw.application import Application, Data
+from fanet_mw.routing.clustered.clustering import Cluster, Promise
+from fanet_mw.routing.flooding import Flooding
+from fanet_mw.units import BROADCAST
+class Fractional(Flooding):
+    def originate(self, packet, *, due_ns, now_ns): self._port.transmit(packet.frame, BROADCAST, now_ns + 5e6)
+class Bundled(Flooding):
+    def originate(self, packet, *, due_ns, now_ns):
+        self._port.transmit_together([packet], flags=1, at_ns=[now_ns + 5e6])
+class Texting(Flooding):
+    def originate(self, packet, *, due_ns, now_ns): self._port.transmit("hello", BROADCAST, due_ns)
+class Odd(Flooding):
+    def receive(self, packet, reception, *, now_ns): return [7]
+class Talking(Flooding):
+    def hello_inner(self, room, *, now_ns): return b"x" * (room + 1)
+class Hurried(Flooding):
+    def hello_share(self, *, now_ns): return math.nan
+class Noting(Flooding):
+    def originate(self, packet, *, due_ns, now_ns): self._port.record("sent")
+class Lone:
+    promise = Promise(dominating=False)
+    def __init__(self, *, count, range_m, options): pass
+    def divide(self, swarm): return [Cluster(1, (1,))]
+class Remote(Lone):
+    def divide(self, swarm): return [Cluster(99, tuple(sorted(swarm.positions)))]
+class Undecided(Lone):
+    promise = None
+class Scribe(Application):
+    name = "scribe"
+    def __init__(self, scenario, node, options): pass
+    def next_wake_ns(self): return 2_600_000_000
+    def wake(self, now_ns): self.port.record("seen")
+class Tapper(Scribe):
+    def wake(self, now_ns): self.port.tap(b"no frame")
+class Patient(Scribe):
+    def wake(self, now_ns): self.port.send(Data(7, b""), lifetime_ns=0.5)
+class Far(Scribe):
+    def wake(self, now_ns): self.port.send(Data(7, b""), destination=99)
+class Greeter(Scribe):
+    def hello_frames(self, now_ns): return b"no frame"
+class Novelist(Scribe):
+    def hello_frames(self, now_ns): return b"x" * 3000
+"""
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ("routing.protocol=wrong:Fractional", "'wrong:Fractional' transmits with start_ns = "),
+        ("routing.protocol=wrong:Bundled", "'wrong:Bundled' transmits with start_ns = "),
+        ("routing.protocol=wrong:Texting", "'wrong:Texting' transmits 'hello', which must be bytes"),
+        ("routing.protocol=wrong:Odd", "'wrong:Odd': receive() must give relays, not 7"),
+        ("routing.protocol=wrong:Talking", "'wrong:Talking': hello_inner(2171) must give at most so many bytes, not 2"),
+        ("routing.protocol=wrong:Hurried", "'wrong:Hurried': hello_share() = nan must be a number above 0"),
+        ("routing.protocol=wrong:Noting", "'wrong:Noting': record() takes a record of fanet_mw.trace, not 'sent'"),
+        ("clusters.method=wrong:Lone", "'wrong:Lone': divide() must give clusters with each of the nodes ["),
+        ("clusters.method=wrong:Remote", "'wrong:Remote': divide() must give clusters with each of the nodes ["),
+        ("clusters.method=wrong:Undecided", "'wrong:Undecided': promise = None must be a Promise"),
+        (
+            "applications=[{use='wrong:Scribe'}]",
+            "application 'scribe' (wrong:Scribe): record() takes a record of fanet",
+        ),
+        ("applications=[{use='wrong:Tapper'}]", "application 'scribe' (wrong:Tapper): tap(): no MAVLink 2 frame at by"),
+        ("applications=[{use='wrong:Patient'}]", "lifetime_ns = 0.5 must be a whole number of ns above 0"),
+        ("applications=[{use='wrong:Greeter'}]", "application 'scribe' (wrong:Greeter): hello_frames(): no MAVLink 2"),
+        ("applications=[{use='wrong:Novelist'}]", "(wrong:Novelist): hello_frames(): 3000 bytes must be <= 2"),
+    ],
+)
+def test_what_a_part_asks_for_is_checked_before_another_actor_hears_of_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, change: str, said: str
+) -> None:
+    (tmp_path / "wrong.py").write_text(WRONG)
+    monkeypatch.syspath_prepend(tmp_path)
+    scenario = catalog.find("quick", ["duration_s=8", "warmup_s=0", "drain_s=1", "mission.survivors=0", change])
+    with pytest.raises((ConfigError, LocalProtocolError)) as caught:
+        simulate(scenario)
+    assert said in str(caught.value)
+
+
+def test_a_mistake_that_our_code_finds_is_said_with_the_function_of_the_part_that_made_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "wrong.py").write_text(WRONG)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    words = ["simulate", "quick", "--set", "applications=[{use='wrong:Far'}]"]
+    assert app(words, result_action="return_value", exit_on_error=False, print_error=False) == 1
+    assert "ended early: wrong:Far.wake (agent-" in (err := capsys.readouterr().err)
+    assert " at 2.6 s) has raised LocalProtocolError: destination = 99 must be " in err

@@ -136,7 +136,9 @@ def test_each_is_woken_at_its_own_instant(make_scenario: MakeScenario) -> None:
 def test_an_instant_that_is_no_whole_number_is_the_mistake_of_an_application_and_does_not_go_under(
     make_scenario: MakeScenario, wake_ns: float
 ) -> None:
-    with pytest.raises(LocalProtocolError, match=r"application 'b' of node 2: next_wake_ns\(\) = .* must be a whole"):
+    with pytest.raises(
+        LocalProtocolError, match=r"'b' .test_onboard:Diary. of node 2: next_wake_ns\(\) = .* must be a whole"
+    ):
         uav(make_scenario, Diary("a", wake_ns=300 * MS), Diary("b", wake_ns=wake_ns))  # type: ignore[arg-type]
 
 
@@ -144,8 +146,30 @@ def test_an_instant_that_is_no_whole_number_is_the_mistake_of_an_application_and
 def test_ports_at_which_nothing_could_arrive_are_refused(make_scenario: MakeScenario, ports: Any) -> None:
     diary = Diary("a")
     diary.ports = ports
-    with pytest.raises(LocalProtocolError, match=r"application 'a': ports has .*, must be numbers in \[1, 65535\]"):
+    with pytest.raises(LocalProtocolError, match=r"'a' .*: ports = .* must be a collection of numbers in \[1, 65535\]"):
         uav(make_scenario, diary)
+
+
+@pytest.mark.parametrize(
+    ("attribute", "value"),
+    [("listens", "HEARTBEAT"), ("listens", (1 << 24,)), ("follows", "sent"), ("follows", ("seen",)), ("name", 5)],
+)
+def test_attributes_that_mean_nothing_are_refused_with_the_class(
+    make_scenario: MakeScenario, attribute: str, value: Any
+) -> None:
+    diary = Diary("a")
+    setattr(diary, attribute, value)
+    with pytest.raises(LocalProtocolError, match=rf"\(test_onboard:Diary\): {attribute} (= .* )?must be "):
+        uav(make_scenario, diary)
+
+
+def test_an_application_whose_method_nobody_would_await_is_refused(make_scenario: MakeScenario) -> None:
+    class Waiting(Diary):
+        async def on_message(self, message: Received, now_ns: int) -> None:  # type: ignore[override]
+            self.lines.append(message)
+
+    with pytest.raises(LocalProtocolError, match=r"Waiting\) has a method on_message that is async, and would never"):
+        uav(make_scenario, Waiting("a"))
 
 
 def test_an_instant_that_an_input_brings_nearer_is_heeded(make_scenario: MakeScenario) -> None:
@@ -504,6 +528,6 @@ def test_a_course_is_a_course(make_scenario: MakeScenario, course: Any) -> None:
             port.fly(course)
 
     with pytest.raises(
-        LocalProtocolError, match=r"application 'pilot': course = .* must be a Course of finite numbers"
+        LocalProtocolError, match=r"application 'pilot' \(.*Pilot\): course = .* must be a Course of finite numbers"
     ):
         uav(make_scenario, Pilot())

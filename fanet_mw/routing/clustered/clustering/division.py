@@ -9,9 +9,10 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, Final
 
+from fanet_mw.errors import ConfigError, LocalProtocolError
 from fanet_mw.extensions import make
 from fanet_mw.graph.topology import Adjacency, levels
-from fanet_mw.routing.clustered.clustering import Balanced, Cluster, Clustering, Swarm
+from fanet_mw.routing.clustered.clustering import Balanced, Cluster, Clustering, Promise, Swarm
 from fanet_mw.routing.clustered.clustering.bisection import among
 from fanet_mw.scenario.tables.clusters import METHODS
 from fanet_mw.units import NodeId
@@ -31,7 +32,8 @@ class Division:
         self._method: Clustering = Balanced(count)
         self._count: int | None = count
         if method not in METHODS:
-            self._method = make("clusters.method", method, count=count, range_m=range_m, options=options)
+            made = make("clusters.method", method, count=count, range_m=range_m, options=options)
+            self._method = _Foreign(method, made)
             self._count = None if self._method.promise.dominating else count
 
     def divide(self, swarm: Swarm) -> list[Cluster]:
@@ -52,6 +54,31 @@ class Division:
         if self._count is not None:
             return len(kept) == fresh
         return all(m == cluster.head or m in adjacency[cluster.head] for cluster in kept for m in cluster.members)
+
+
+class _Foreign:
+    """A clustering method of another package, whose clusters are checked: no node is left out, or led from outside."""
+
+    def __init__(self, name: str, method: Clustering) -> None:
+        self._name, self._method = name, method
+        promise = getattr(method, "promise", None)
+        if not isinstance(promise, Promise):
+            raise ConfigError(f"clusters.method = {name!r}: promise = {promise!r} must be a Promise")
+        self.promise = promise
+
+    def divide(self, swarm: Swarm) -> list[Cluster]:
+        told = self._method.divide(swarm)
+        try:
+            clusters = [Cluster(head, tuple(members)) for head, members in told]
+            once = sorted(node for cluster in clusters for node in cluster.members) == sorted(swarm.positions)
+        except (TypeError, ValueError):
+            once, clusters = False, []
+        if not once or any(cluster.head not in cluster.members for cluster in clusters):
+            raise LocalProtocolError(
+                f"clusters.method = {self._name!r}: divide() must give clusters with each of the nodes "
+                f"{sorted(swarm.positions)} in one, and its head among them, not {' '.join(repr(told).split()):.120}"
+            )
+        return clusters
 
 
 def cost(clusters: Sequence[Cluster], adjacency: Adjacency, *, fair: int) -> float:

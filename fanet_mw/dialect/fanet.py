@@ -1185,22 +1185,22 @@ class MAVLink_fanet_search_message(MAVLink_message):
 
     id = MAVLINK_MSG_ID_FANET_SEARCH
     msgname = "FANET_SEARCH"
-    fieldnames = ["start_us", "half_width", "first", "last", "height", "speed", "narrower", "deploy_ds", "revision", "planner", "nodes", "lanes", "relays", "followers", "shape", "teams", "version"]
-    ordered_fieldnames = ["start_us", "half_width", "first", "last", "height", "speed", "narrower", "deploy_ds", "revision", "planner", "nodes", "lanes", "relays", "followers", "shape", "teams", "version"]
-    fieldtypes = ["uint64_t", "float", "float", "float", "float", "float", "float", "uint16_t", "uint16_t", "uint16_t", "uint16_t", "uint8_t", "uint8_t", "uint8_t", "uint8_t", "uint8_t", "uint8_t"]
+    fieldnames = ["start_us", "half_width", "first", "last", "height", "speed", "narrower", "deploy_ds", "revision", "planner", "lanes", "relays", "followers", "shape", "teams", "version", "nodes"]
+    ordered_fieldnames = ["start_us", "half_width", "first", "last", "height", "speed", "narrower", "deploy_ds", "revision", "planner", "lanes", "relays", "followers", "shape", "teams", "version", "nodes"]
+    fieldtypes = ["uint64_t", "float", "float", "float", "float", "float", "float", "uint16_t", "uint16_t", "uint16_t", "uint8_t", "uint8_t", "uint8_t", "uint8_t", "uint8_t", "uint8_t", "uint8_t"]
     fielddisplays_by_name: Dict[str, str] = {}
     fieldenums_by_name: Dict[str, str] = {}
     fieldunits_by_name: Dict[str, str] = {"start_us": "us", "half_width": "m", "first": "m", "last": "m", "height": "m", "speed": "m/s", "narrower": "m", "deploy_ds": "ds"}
-    native_format = bytearray(b"<QffffffHHHHBBBBBB")
+    native_format = bytearray(b"<QffffffHHHBBBBBBB")
     orders = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16]
-    lengths = [1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 79, 1, 1, 1, 1, 1, 1]
-    array_lengths = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 79, 0, 0, 0, 0, 0, 0]
-    crc_extra = 197
-    unpacker = struct.Struct("<QffffffHHH79HBBBBBB")
+    lengths = [1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 200]
+    array_lengths = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 200]
+    crc_extra = 215
+    unpacker = struct.Struct("<QffffffHHHBBBBBB200B")
     instance_field = None
     instance_offset = -1
 
-    def __init__(self, start_us: int, half_width: float, first: float, last: float, height: float, speed: float, narrower: float, deploy_ds: int, revision: int, planner: int, nodes: Sequence[int], lanes: int, relays: int, followers: int, shape: int, teams: int, version: int):
+    def __init__(self, start_us: int, half_width: float, first: float, last: float, height: float, speed: float, narrower: float, deploy_ds: int, revision: int, planner: int, lanes: int, relays: int, followers: int, shape: int, teams: int, version: int, nodes: Sequence[int]):
         MAVLink_message.__init__(self, MAVLink_fanet_search_message.id, MAVLink_fanet_search_message.msgname)
         self._fieldnames = MAVLink_fanet_search_message.fieldnames
         self._instance_field = MAVLink_fanet_search_message.instance_field
@@ -1215,16 +1215,16 @@ class MAVLink_fanet_search_message(MAVLink_message):
         self.deploy_ds = deploy_ds
         self.revision = revision
         self.planner = planner
-        self.nodes = nodes
         self.lanes = lanes
         self.relays = relays
         self.followers = followers
         self.shape = shape
         self.teams = teams
         self.version = version
+        self.nodes = nodes
 
     def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
-        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.start_us, self.half_width, self.first, self.last, self.height, self.speed, self.narrower, self.deploy_ds, self.revision, self.planner, self.nodes[0], self.nodes[1], self.nodes[2], self.nodes[3], self.nodes[4], self.nodes[5], self.nodes[6], self.nodes[7], self.nodes[8], self.nodes[9], self.nodes[10], self.nodes[11], self.nodes[12], self.nodes[13], self.nodes[14], self.nodes[15], self.nodes[16], self.nodes[17], self.nodes[18], self.nodes[19], self.nodes[20], self.nodes[21], self.nodes[22], self.nodes[23], self.nodes[24], self.nodes[25], self.nodes[26], self.nodes[27], self.nodes[28], self.nodes[29], self.nodes[30], self.nodes[31], self.nodes[32], self.nodes[33], self.nodes[34], self.nodes[35], self.nodes[36], self.nodes[37], self.nodes[38], self.nodes[39], self.nodes[40], self.nodes[41], self.nodes[42], self.nodes[43], self.nodes[44], self.nodes[45], self.nodes[46], self.nodes[47], self.nodes[48], self.nodes[49], self.nodes[50], self.nodes[51], self.nodes[52], self.nodes[53], self.nodes[54], self.nodes[55], self.nodes[56], self.nodes[57], self.nodes[58], self.nodes[59], self.nodes[60], self.nodes[61], self.nodes[62], self.nodes[63], self.nodes[64], self.nodes[65], self.nodes[66], self.nodes[67], self.nodes[68], self.nodes[69], self.nodes[70], self.nodes[71], self.nodes[72], self.nodes[73], self.nodes[74], self.nodes[75], self.nodes[76], self.nodes[77], self.nodes[78], self.lanes, self.relays, self.followers, self.shape, self.teams, self.version), force_mavlink1=force_mavlink1)
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.start_us, self.half_width, self.first, self.last, self.height, self.speed, self.narrower, self.deploy_ds, self.revision, self.planner, self.lanes, self.relays, self.followers, self.shape, self.teams, self.version, self.nodes[0], self.nodes[1], self.nodes[2], self.nodes[3], self.nodes[4], self.nodes[5], self.nodes[6], self.nodes[7], self.nodes[8], self.nodes[9], self.nodes[10], self.nodes[11], self.nodes[12], self.nodes[13], self.nodes[14], self.nodes[15], self.nodes[16], self.nodes[17], self.nodes[18], self.nodes[19], self.nodes[20], self.nodes[21], self.nodes[22], self.nodes[23], self.nodes[24], self.nodes[25], self.nodes[26], self.nodes[27], self.nodes[28], self.nodes[29], self.nodes[30], self.nodes[31], self.nodes[32], self.nodes[33], self.nodes[34], self.nodes[35], self.nodes[36], self.nodes[37], self.nodes[38], self.nodes[39], self.nodes[40], self.nodes[41], self.nodes[42], self.nodes[43], self.nodes[44], self.nodes[45], self.nodes[46], self.nodes[47], self.nodes[48], self.nodes[49], self.nodes[50], self.nodes[51], self.nodes[52], self.nodes[53], self.nodes[54], self.nodes[55], self.nodes[56], self.nodes[57], self.nodes[58], self.nodes[59], self.nodes[60], self.nodes[61], self.nodes[62], self.nodes[63], self.nodes[64], self.nodes[65], self.nodes[66], self.nodes[67], self.nodes[68], self.nodes[69], self.nodes[70], self.nodes[71], self.nodes[72], self.nodes[73], self.nodes[74], self.nodes[75], self.nodes[76], self.nodes[77], self.nodes[78], self.nodes[79], self.nodes[80], self.nodes[81], self.nodes[82], self.nodes[83], self.nodes[84], self.nodes[85], self.nodes[86], self.nodes[87], self.nodes[88], self.nodes[89], self.nodes[90], self.nodes[91], self.nodes[92], self.nodes[93], self.nodes[94], self.nodes[95], self.nodes[96], self.nodes[97], self.nodes[98], self.nodes[99], self.nodes[100], self.nodes[101], self.nodes[102], self.nodes[103], self.nodes[104], self.nodes[105], self.nodes[106], self.nodes[107], self.nodes[108], self.nodes[109], self.nodes[110], self.nodes[111], self.nodes[112], self.nodes[113], self.nodes[114], self.nodes[115], self.nodes[116], self.nodes[117], self.nodes[118], self.nodes[119], self.nodes[120], self.nodes[121], self.nodes[122], self.nodes[123], self.nodes[124], self.nodes[125], self.nodes[126], self.nodes[127], self.nodes[128], self.nodes[129], self.nodes[130], self.nodes[131], self.nodes[132], self.nodes[133], self.nodes[134], self.nodes[135], self.nodes[136], self.nodes[137], self.nodes[138], self.nodes[139], self.nodes[140], self.nodes[141], self.nodes[142], self.nodes[143], self.nodes[144], self.nodes[145], self.nodes[146], self.nodes[147], self.nodes[148], self.nodes[149], self.nodes[150], self.nodes[151], self.nodes[152], self.nodes[153], self.nodes[154], self.nodes[155], self.nodes[156], self.nodes[157], self.nodes[158], self.nodes[159], self.nodes[160], self.nodes[161], self.nodes[162], self.nodes[163], self.nodes[164], self.nodes[165], self.nodes[166], self.nodes[167], self.nodes[168], self.nodes[169], self.nodes[170], self.nodes[171], self.nodes[172], self.nodes[173], self.nodes[174], self.nodes[175], self.nodes[176], self.nodes[177], self.nodes[178], self.nodes[179], self.nodes[180], self.nodes[181], self.nodes[182], self.nodes[183], self.nodes[184], self.nodes[185], self.nodes[186], self.nodes[187], self.nodes[188], self.nodes[189], self.nodes[190], self.nodes[191], self.nodes[192], self.nodes[193], self.nodes[194], self.nodes[195], self.nodes[196], self.nodes[197], self.nodes[198], self.nodes[199]), force_mavlink1=force_mavlink1)
 
 
 # Define name on the class for backwards compatibility (it is now msgname).
@@ -1380,22 +1380,22 @@ class MAVLink_fanet_roll_message(MAVLink_message):
 
     id = MAVLINK_MSG_ID_FANET_ROLL
     msgname = "FANET_ROLL"
-    fieldnames = ["at_half_s", "planner", "revision", "entries", "version"]
-    ordered_fieldnames = ["at_half_s", "planner", "revision", "entries", "version"]
+    fieldnames = ["at_half_s", "planner", "revision", "version", "entries"]
+    ordered_fieldnames = ["at_half_s", "planner", "revision", "version", "entries"]
     fieldtypes = ["uint32_t", "uint16_t", "uint16_t", "uint8_t", "uint8_t"]
     fielddisplays_by_name: Dict[str, str] = {}
     fieldenums_by_name: Dict[str, str] = {}
     fieldunits_by_name: Dict[str, str] = {}
     native_format = bytearray(b"<IHHBB")
     orders = [0, 1, 2, 3, 4]
-    lengths = [1, 1, 1, 79, 1]
-    array_lengths = [0, 0, 0, 79, 0]
-    crc_extra = 30
-    unpacker = struct.Struct("<IHH79BB")
+    lengths = [1, 1, 1, 1, 200]
+    array_lengths = [0, 0, 0, 0, 200]
+    crc_extra = 142
+    unpacker = struct.Struct("<IHHB200B")
     instance_field = None
     instance_offset = -1
 
-    def __init__(self, at_half_s: int, planner: int, revision: int, entries: Sequence[int], version: int):
+    def __init__(self, at_half_s: int, planner: int, revision: int, version: int, entries: Sequence[int]):
         MAVLink_message.__init__(self, MAVLink_fanet_roll_message.id, MAVLink_fanet_roll_message.msgname)
         self._fieldnames = MAVLink_fanet_roll_message.fieldnames
         self._instance_field = MAVLink_fanet_roll_message.instance_field
@@ -1403,11 +1403,11 @@ class MAVLink_fanet_roll_message(MAVLink_message):
         self.at_half_s = at_half_s
         self.planner = planner
         self.revision = revision
-        self.entries = entries
         self.version = version
+        self.entries = entries
 
     def pack(self, mav: "MAVLink", force_mavlink1: bool = False) -> bytes:
-        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.at_half_s, self.planner, self.revision, self.entries[0], self.entries[1], self.entries[2], self.entries[3], self.entries[4], self.entries[5], self.entries[6], self.entries[7], self.entries[8], self.entries[9], self.entries[10], self.entries[11], self.entries[12], self.entries[13], self.entries[14], self.entries[15], self.entries[16], self.entries[17], self.entries[18], self.entries[19], self.entries[20], self.entries[21], self.entries[22], self.entries[23], self.entries[24], self.entries[25], self.entries[26], self.entries[27], self.entries[28], self.entries[29], self.entries[30], self.entries[31], self.entries[32], self.entries[33], self.entries[34], self.entries[35], self.entries[36], self.entries[37], self.entries[38], self.entries[39], self.entries[40], self.entries[41], self.entries[42], self.entries[43], self.entries[44], self.entries[45], self.entries[46], self.entries[47], self.entries[48], self.entries[49], self.entries[50], self.entries[51], self.entries[52], self.entries[53], self.entries[54], self.entries[55], self.entries[56], self.entries[57], self.entries[58], self.entries[59], self.entries[60], self.entries[61], self.entries[62], self.entries[63], self.entries[64], self.entries[65], self.entries[66], self.entries[67], self.entries[68], self.entries[69], self.entries[70], self.entries[71], self.entries[72], self.entries[73], self.entries[74], self.entries[75], self.entries[76], self.entries[77], self.entries[78], self.version), force_mavlink1=force_mavlink1)
+        return self._pack(mav, self.crc_extra, self.unpacker.pack(self.at_half_s, self.planner, self.revision, self.version, self.entries[0], self.entries[1], self.entries[2], self.entries[3], self.entries[4], self.entries[5], self.entries[6], self.entries[7], self.entries[8], self.entries[9], self.entries[10], self.entries[11], self.entries[12], self.entries[13], self.entries[14], self.entries[15], self.entries[16], self.entries[17], self.entries[18], self.entries[19], self.entries[20], self.entries[21], self.entries[22], self.entries[23], self.entries[24], self.entries[25], self.entries[26], self.entries[27], self.entries[28], self.entries[29], self.entries[30], self.entries[31], self.entries[32], self.entries[33], self.entries[34], self.entries[35], self.entries[36], self.entries[37], self.entries[38], self.entries[39], self.entries[40], self.entries[41], self.entries[42], self.entries[43], self.entries[44], self.entries[45], self.entries[46], self.entries[47], self.entries[48], self.entries[49], self.entries[50], self.entries[51], self.entries[52], self.entries[53], self.entries[54], self.entries[55], self.entries[56], self.entries[57], self.entries[58], self.entries[59], self.entries[60], self.entries[61], self.entries[62], self.entries[63], self.entries[64], self.entries[65], self.entries[66], self.entries[67], self.entries[68], self.entries[69], self.entries[70], self.entries[71], self.entries[72], self.entries[73], self.entries[74], self.entries[75], self.entries[76], self.entries[77], self.entries[78], self.entries[79], self.entries[80], self.entries[81], self.entries[82], self.entries[83], self.entries[84], self.entries[85], self.entries[86], self.entries[87], self.entries[88], self.entries[89], self.entries[90], self.entries[91], self.entries[92], self.entries[93], self.entries[94], self.entries[95], self.entries[96], self.entries[97], self.entries[98], self.entries[99], self.entries[100], self.entries[101], self.entries[102], self.entries[103], self.entries[104], self.entries[105], self.entries[106], self.entries[107], self.entries[108], self.entries[109], self.entries[110], self.entries[111], self.entries[112], self.entries[113], self.entries[114], self.entries[115], self.entries[116], self.entries[117], self.entries[118], self.entries[119], self.entries[120], self.entries[121], self.entries[122], self.entries[123], self.entries[124], self.entries[125], self.entries[126], self.entries[127], self.entries[128], self.entries[129], self.entries[130], self.entries[131], self.entries[132], self.entries[133], self.entries[134], self.entries[135], self.entries[136], self.entries[137], self.entries[138], self.entries[139], self.entries[140], self.entries[141], self.entries[142], self.entries[143], self.entries[144], self.entries[145], self.entries[146], self.entries[147], self.entries[148], self.entries[149], self.entries[150], self.entries[151], self.entries[152], self.entries[153], self.entries[154], self.entries[155], self.entries[156], self.entries[157], self.entries[158], self.entries[159], self.entries[160], self.entries[161], self.entries[162], self.entries[163], self.entries[164], self.entries[165], self.entries[166], self.entries[167], self.entries[168], self.entries[169], self.entries[170], self.entries[171], self.entries[172], self.entries[173], self.entries[174], self.entries[175], self.entries[176], self.entries[177], self.entries[178], self.entries[179], self.entries[180], self.entries[181], self.entries[182], self.entries[183], self.entries[184], self.entries[185], self.entries[186], self.entries[187], self.entries[188], self.entries[189], self.entries[190], self.entries[191], self.entries[192], self.entries[193], self.entries[194], self.entries[195], self.entries[196], self.entries[197], self.entries[198], self.entries[199]), force_mavlink1=force_mavlink1)
 
 
 # Define name on the class for backwards compatibility (it is now msgname).
@@ -2467,7 +2467,7 @@ class MAVLink(object):
         """
         self.send(self.fanet_held_encode(seqs, origins, count, version), force_mavlink1=force_mavlink1)
 
-    def fanet_search_encode(self, start_us: int, half_width: float, first: float, last: float, height: float, speed: float, narrower: float, deploy_ds: int, revision: int, planner: int, nodes: Sequence[int], lanes: int, relays: int, followers: int, shape: int, teams: int, version: int) -> MAVLink_fanet_search_message:
+    def fanet_search_encode(self, start_us: int, half_width: float, first: float, last: float, height: float, speed: float, narrower: float, deploy_ds: int, revision: int, planner: int, lanes: int, relays: int, followers: int, shape: int, teams: int, version: int, nodes: Sequence[int]) -> MAVLink_fanet_search_message:
         """
         The plan of a search: a formation, when it sweeps, and which node
         takes which place of it. Lines: two teams abreast begin beside
@@ -2488,18 +2488,18 @@ class MAVLink(object):
         deploy_ds                 : How long everyone has to reach its place. [ds] (type:uint16_t)
         revision                  : A higher one replaces a lower one; of equal ones the planner with the lower id prevails. (type:uint16_t)
         planner                   : The node that made it. (type:uint16_t)
-        nodes                     : The node of each place: team 0 lane by lane, team 1 and so on, the chain from line 0, followers; 0: vacant. (type:uint16_t)
         lanes                     : Places of each team. (type:uint8_t)
         relays                    : Places of the chain. (type:uint8_t)
         followers                 : Places behind the teams. (type:uint8_t)
         shape                     : 0: lines, 1: spiral, 2: sectors, 3: ring, 4: circuit, 5: fan. (type:uint8_t)
         teams                     : Lines abreast; an even number for lines. (type:uint8_t)
         version                   : 1. (type:uint8_t)
+        nodes                     : The node of each place: team 0 lane by lane, team 1 and so on, the chain from line 0, followers; 0: vacant. Zeros at the end are left out. (type:uint8_t)
 
         """
-        return MAVLink_fanet_search_message(start_us, half_width, first, last, height, speed, narrower, deploy_ds, revision, planner, nodes, lanes, relays, followers, shape, teams, version)
+        return MAVLink_fanet_search_message(start_us, half_width, first, last, height, speed, narrower, deploy_ds, revision, planner, lanes, relays, followers, shape, teams, version, nodes)
 
-    def fanet_search_send(self, start_us: int, half_width: float, first: float, last: float, height: float, speed: float, narrower: float, deploy_ds: int, revision: int, planner: int, nodes: Sequence[int], lanes: int, relays: int, followers: int, shape: int, teams: int, version: int, force_mavlink1: bool = False) -> None:
+    def fanet_search_send(self, start_us: int, half_width: float, first: float, last: float, height: float, speed: float, narrower: float, deploy_ds: int, revision: int, planner: int, lanes: int, relays: int, followers: int, shape: int, teams: int, version: int, nodes: Sequence[int], force_mavlink1: bool = False) -> None:
         """
         The plan of a search: a formation, when it sweeps, and which node
         takes which place of it. Lines: two teams abreast begin beside
@@ -2520,16 +2520,16 @@ class MAVLink(object):
         deploy_ds                 : How long everyone has to reach its place. [ds] (type:uint16_t)
         revision                  : A higher one replaces a lower one; of equal ones the planner with the lower id prevails. (type:uint16_t)
         planner                   : The node that made it. (type:uint16_t)
-        nodes                     : The node of each place: team 0 lane by lane, team 1 and so on, the chain from line 0, followers; 0: vacant. (type:uint16_t)
         lanes                     : Places of each team. (type:uint8_t)
         relays                    : Places of the chain. (type:uint8_t)
         followers                 : Places behind the teams. (type:uint8_t)
         shape                     : 0: lines, 1: spiral, 2: sectors, 3: ring, 4: circuit, 5: fan. (type:uint8_t)
         teams                     : Lines abreast; an even number for lines. (type:uint8_t)
         version                   : 1. (type:uint8_t)
+        nodes                     : The node of each place: team 0 lane by lane, team 1 and so on, the chain from line 0, followers; 0: vacant. Zeros at the end are left out. (type:uint8_t)
 
         """
-        self.send(self.fanet_search_encode(start_us, half_width, first, last, height, speed, narrower, deploy_ds, revision, planner, nodes, lanes, relays, followers, shape, teams, version), force_mavlink1=force_mavlink1)
+        self.send(self.fanet_search_encode(start_us, half_width, first, last, height, speed, narrower, deploy_ds, revision, planner, lanes, relays, followers, shape, teams, version, nodes), force_mavlink1=force_mavlink1)
 
     def fanet_status_encode(self, t_us: int, east: float, north: float, up: float, node: int, revision: int, charge: int, absent: int, version: int) -> MAVLink_fanet_status_message:
         """
@@ -2637,7 +2637,7 @@ class MAVLink(object):
         """
         self.send(self.fanet_found_encode(t_us, survivor, east, north, east_variance, covariance, north_variance, node, confirmed, version), force_mavlink1=force_mavlink1)
 
-    def fanet_roll_encode(self, at_half_s: int, planner: int, revision: int, entries: Sequence[int], version: int) -> MAVLink_fanet_roll_message:
+    def fanet_roll_encode(self, at_half_s: int, planner: int, revision: int, version: int, entries: Sequence[int]) -> MAVLink_fanet_roll_message:
         """
         When each UAV of the plan was last heard by anybody, as far as the
         sender knows, and which of them are lost.
@@ -2645,13 +2645,13 @@ class MAVLink(object):
         at_half_s                 : Swarm time of the sender, in half seconds. (type:uint32_t)
         planner                   : The node that made the plan. (type:uint16_t)
         revision                  : Of the plan whose places these are. (type:uint16_t)
-        entries                   : Of each place: how many half seconds before that time its UAV was last heard, 127: longer ago or never; plus 128 if it is lost. (type:uint8_t)
         version                   : 1. (type:uint8_t)
+        entries                   : Of each place: how many half seconds before that time its UAV was last heard, 127: longer ago or never; plus 128 if it is lost. Zeros at the end are left out. (type:uint8_t)
 
         """
-        return MAVLink_fanet_roll_message(at_half_s, planner, revision, entries, version)
+        return MAVLink_fanet_roll_message(at_half_s, planner, revision, version, entries)
 
-    def fanet_roll_send(self, at_half_s: int, planner: int, revision: int, entries: Sequence[int], version: int, force_mavlink1: bool = False) -> None:
+    def fanet_roll_send(self, at_half_s: int, planner: int, revision: int, version: int, entries: Sequence[int], force_mavlink1: bool = False) -> None:
         """
         When each UAV of the plan was last heard by anybody, as far as the
         sender knows, and which of them are lost.
@@ -2659,11 +2659,11 @@ class MAVLink(object):
         at_half_s                 : Swarm time of the sender, in half seconds. (type:uint32_t)
         planner                   : The node that made the plan. (type:uint16_t)
         revision                  : Of the plan whose places these are. (type:uint16_t)
-        entries                   : Of each place: how many half seconds before that time its UAV was last heard, 127: longer ago or never; plus 128 if it is lost. (type:uint8_t)
         version                   : 1. (type:uint8_t)
+        entries                   : Of each place: how many half seconds before that time its UAV was last heard, 127: longer ago or never; plus 128 if it is lost. Zeros at the end are left out. (type:uint8_t)
 
         """
-        self.send(self.fanet_roll_encode(at_half_s, planner, revision, entries, version), force_mavlink1=force_mavlink1)
+        self.send(self.fanet_roll_encode(at_half_s, planner, revision, version, entries), force_mavlink1=force_mavlink1)
 
     def fanet_order_encode(self, t_us: int, east: float, north: float, radius: float, serial: int, post: int, node: int, kind: int, version: int) -> MAVLink_fanet_order_message:
         """

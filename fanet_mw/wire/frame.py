@@ -102,6 +102,11 @@ def encode_inner(spec: Spec, payload: bytes, *, node: int, seq: int = 0) -> byte
     return head + payload + _CRC.pack(crc)
 
 
+def encode_truncated(spec: Spec, payload: bytes, *, node: int) -> bytes:
+    """The same without the zeros at the end of the payload, as MAVLink 2 leaves them out."""
+    return encode_inner(spec, payload[:1] + payload[1:].rstrip(b"\0"), node=node)
+
+
 def message_id(frame: bytes, at: int = 0) -> int:
     """The id of the message in the MAVLink 2 frame at an offset."""
     return frame[at + 7] | frame[at + 8] << 8 | frame[at + 9] << 16
@@ -124,6 +129,8 @@ ANY_NODE: Final = 0xFFFF
 _PACKED: Final = struct.Struct("<4sBB4s" + ROUTE.layout.format[1:])
 _CHECKED: Final = struct.Struct("<3s4x3s" + ROUTE.layout.format[1:] + "H")
 _BODY_END: Final = HEADER_BYTES - 2
+_PAYLOAD_AT: Final = 10
+"""Where the payload of a MAVLink 2 frame begins."""
 _SYSTEM_AT: Final = 5
 END_TO_END: Final = slice(10, 26)
 """The bytes of a routing header that no hop changes: birth, sequence number, origin and destination."""
@@ -321,18 +328,25 @@ def decode_every(spec: Spec, packed: Packed) -> list[tuple[Any, ...]]:
     found = []
     for msgid, inner in inner_frames(packed):
         if msgid == spec.msgid:
-            if inner[1] != spec.layout.size:
-                raise MalformedFrameError(f"message {msgid} of {inner[1]} bytes, not {spec.layout.size}")
-            found.append(spec.layout.unpack_from(inner, 10))
+            if inner[1] > spec.layout.size:
+                raise MalformedFrameError(f"message {msgid} of {inner[1]} bytes must have <= {spec.layout.size}")
+            found.append(_filled(spec, inner))
     return found
+
+
+def _filled(spec: Spec, inner: bytes) -> tuple[Any, ...]:
+    """The fields of an inner frame; zeros that its sender left out at the end of the payload are filled in."""
+    if inner[1] == spec.layout.size:
+        return spec.layout.unpack_from(inner, _PAYLOAD_AT)
+    return spec.layout.unpack(inner[_PAYLOAD_AT : _PAYLOAD_AT + inner[1]].ljust(spec.layout.size, b"\0"))
 
 
 def fields_of_each(packed: Packed) -> Iterator[tuple[Spec, tuple[Any, ...]]]:
     """The fields of each inner frame with a message of this dialect; raises MalformedFrameError."""
     for msgid, inner in inner_frames(packed):
         spec = _OURS.get(msgid)
-        if spec is not None and inner[1] == spec.layout.size:
-            yield spec, spec.layout.unpack_from(inner, 10)
+        if spec is not None and inner[1] <= spec.layout.size:
+            yield spec, _filled(spec, inner)
 
 
 def decode_first(spec: Spec, packed: Packed) -> tuple[Any, ...]:
@@ -361,11 +375,11 @@ TARGETS: Final = Spec(53014, 54, struct.Struct("<32HBB"))
 LOADS: Final = Spec(53015, 190, struct.Struct("<56HBB"))
 HEARD: Final = Spec(53016, 200, struct.Struct("<64BBBB"))
 HELD: Final = Spec(53017, 58, struct.Struct("<16I16HBB"))
-SEARCH: Final = Spec(53020, 197, struct.Struct("<QffffffHHH79HBBBBBB"))
+SEARCH: Final = Spec(53020, 197, struct.Struct("<QffffffHHHBBBBBB200B"))
 STATUS: Final = Spec(53021, 210, struct.Struct("<QfffHHBBB"))
 BIDS: Final = Spec(53022, 212, struct.Struct("<12H12H12H12HH12BBB"))
 FOUND: Final = Spec(53023, 195, struct.Struct("<QIfffffHBB"))
-ROLL: Final = Spec(53025, 30, struct.Struct("<IHH79BB"))
+ROLL: Final = Spec(53025, 30, struct.Struct("<IHHB200B"))
 ORDER: Final = Spec(53026, 213, struct.Struct("<QfffHHHBB"))
 SPECS: Final = (
     ROUTE, BEACON, SCHEDULE, SURVIVOR, CHUNK, TIME, JOIN, DIGEST, PLACES, ROUTING, LINKS,

@@ -24,6 +24,7 @@ from fanet_mw.wire.frame import (
     VERSION,
     Packed,
     encode_inner,
+    encode_truncated,
     fields_of_each,
 )
 from fanet_mw.wire.search_plan import MOST_PLACES, Search, SearchStatus
@@ -82,14 +83,13 @@ class Roll(NamedTuple):
         if len(self.ages) > MOST_PLACES:
             raise LocalProtocolError(f"a roll of {len(self.ages)} places must have <= {MOST_PLACES}")
         entries = [min(age, LONG_AGO) | (_LOST if place in self.lost else 0) for place, age in enumerate(self.ages)]
-        unused = (LONG_AGO,) * (MOST_PLACES - len(entries))
-        return encode_inner(
-            ROLL, ROLL.layout.pack(self.at, self.planner, self.revision, *entries, *unused, VERSION), node=node
-        )
+        unused = (0,) * (MOST_PLACES - len(entries))
+        packed = ROLL.layout.pack(self.at, self.planner, self.revision, VERSION, *entries, *unused)
+        return encode_truncated(ROLL, packed, node=node)
 
     @classmethod
     def checked(cls, fields: tuple[Any, ...]) -> Self:
-        at, planner, revision, *entries, version = fields
+        at, planner, revision, version, *entries = fields
         refuse_unless(version == VERSION and 0 < planner < ANY_NODE and revision > 0, f"roll of {planner}, {revision}")
         lost = frozenset(place for place, entry in enumerate(entries) if entry & _LOST)
         return cls(at, planner, revision, tuple(entry & ~_LOST for entry in entries), lost)

@@ -5,10 +5,12 @@ from typing import Any, Final, NamedTuple, Self
 from fanet_mw.errors import LocalProtocolError
 from fanet_mw.units import FARTHEST_M, Enu
 from fanet_mw.wire.checks import refuse_unless
-from fanet_mw.wire.frame import ANY_NODE, LATEST_US, SEARCH, STATUS, VERSION, encode_inner
+from fanet_mw.wire.frame import ANY_NODE, LATEST_US, SEARCH, STATUS, VERSION, encode_inner, encode_truncated
 
-MOST_PLACES: Final = 79
+MOST_PLACES: Final = 200
 """The number of places of a formation that one message can assign."""
+MOST_PLACED: Final = 255
+"""The greatest id of a UAV that can have a place: a plan names each by one byte."""
 _LINES: Final = 0
 _SPIRAL: Final = 1
 _FAN: Final = 5
@@ -44,14 +46,16 @@ class Search(NamedTuple):
     def encode_frame(self, node: int) -> bytes:
         if len(self.nodes) > MOST_PLACES:
             raise LocalProtocolError(f"a plan of {len(self.nodes)} places must have <= {MOST_PLACES}")
+        if max(self.nodes, default=0) > MOST_PLACED:
+            raise LocalProtocolError(f"a plan of UAV {max(self.nodes)}; each must be <= {MOST_PLACED}")
         unused = (0,) * (MOST_PLACES - len(self.nodes))
         counts = self.lanes, self.relays, self.followers, self.shape, self.teams
-        packed = SEARCH.layout.pack(*self[:6], self.narrower_m, *self[6:9], *self.nodes, *unused, *counts, VERSION)
-        return encode_inner(SEARCH, packed, node=node)
+        packed = SEARCH.layout.pack(*self[:6], self.narrower_m, *self[6:9], *counts, VERSION, *self.nodes, *unused)
+        return encode_truncated(SEARCH, packed, node=node)
 
     @classmethod
     def checked(cls, fields: tuple[Any, ...]) -> Self:
-        lanes, relays, followers, shape, teams, version = fields[-6:]
+        lanes, relays, followers, shape, teams, version = fields[10:16]
         places = teams * lanes + relays + followers
         in_lines = shape == _LINES and teams >= 2 and teams % 2 == 0 and lanes >= 2
         other = _LINES < shape <= _LAST_SHAPE and teams >= 1 and lanes >= 1 and relays == 0
@@ -59,14 +63,13 @@ class Search(NamedTuple):
             version == VERSION and (in_lines or other) and places <= MOST_PLACES,
             f"a plan of {places} places in {teams} teams, shape {shape}",
         )
-        nodes, narrower_m = fields[10 : 10 + places], fields[6]
+        nodes, narrower_m = fields[16 : 16 + places], fields[6]
         plan = cls._make((*fields[:6], *fields[7:10], nodes, lanes, relays, followers, shape, teams, narrower_m))
         named = [node for node in nodes if node]
         refuse_unless(
             plan.start_us <= LATEST_US
             and 0 < plan.planner < ANY_NODE
             and plan.revision > 0
-            and ANY_NODE not in named
             and len(set(named)) == len(named),
             f"plan {plan.revision} of {plan.planner}",
         )

@@ -15,7 +15,7 @@ from agents.mission.search_formation.roll_call import RollCall
 from agents.mission.search_formation.shapes.contract import Dimensions, ShapeName, swarm_at
 from fanet_mw.serial_number import following, newer
 from fanet_mw.units import US, Enu, NodeId, S
-from fanet_mw.wire.search_plan import Search, SearchStatus
+from fanet_mw.wire.search_plan import MOST_PLACED, Search, SearchStatus
 
 STATUS_S: Final = 12.0
 """The interval at which a UAV of a swarm of up to `_MANY` sends its status."""
@@ -240,11 +240,11 @@ class FormationPlanner:
 
     def _first(self, pattern: Pattern, now_ns: int, *, but: Collection[int] = ()) -> Search:
         staying = (node for node, member in self._members.items() if not member.leaves and node not in but)
-        nodes = sorted(staying)[: pattern.places]
+        nodes = sorted(node for node in staying if node <= MOST_PLACED)[: pattern.places]
         starts = [self._members[node].position for node in nodes]
-        from_middle = pattern.dimensions
+        from_middle_m = pattern.dimensions.first_m
         pattern, chosen = self._shared_out(pattern, nodes, starts)
-        begins_around = pattern.dimensions != from_middle
+        begins_around = pattern.dimensions.first_m > from_middle_m
         among_s = swarm_at(starts, reach_m=pattern.reach_m).apart_m / _AMONG_M_S if begins_around else 0.0
         farthest_m = max(
             pattern.at(place, 0.0).horizontal_to(start) for place, start in zip(chosen, starts, strict=True)
@@ -269,23 +269,31 @@ class FormationPlanner:
     def _shared_out(
         self, pattern: Pattern, nodes: Sequence[int], starts: Sequence[Enu]
     ) -> tuple[Pattern, Sequence[int]]:
-        """The largest formation around the swarm whose places the UAVs reach without coming apart, else the smallest;
-        and the place of each UAV.
+        """The fastest formation to which the UAVs fly without coming apart, and the place of each; if there is none,
+        the nearest with as many teams as the fastest.
         """
         if len(nodes) == 1:
             return pattern, [(nodes[0] - 1) % pattern.places]
-        absent, followers = self.absent, pattern.followers
+        nearest: tuple[Pattern, Sequence[int]] | None = None
         for begun in pattern.begun_around(starts):
-            chosen, is_one = keep_together(
-                starts,
-                [begun.at(place, 0.0) for place in range(begun.places)],
-                lambda uav, place: _BUSY_M2 * (nodes[uav] in absent and place not in followers),
-                reach_m=begun.reach_m,
-                random=self._random,
-            )
+            chosen, is_one = self._assigned(begun, nodes, starts)
             if is_one:
-                break
-        return begun, chosen
+                return begun, chosen
+            if nearest is None or begun.dimensions.teams == nearest[0].dimensions.teams:
+                nearest = begun, chosen
+        assert nearest is not None, "a formation may begin at least as it is"
+        return nearest
+
+    def _assigned(self, pattern: Pattern, nodes: Sequence[int], starts: Sequence[Enu]) -> tuple[Sequence[int], bool]:
+        """The place of each UAV, and whether all stay one network on the way there."""
+        absent, followers = self.absent, pattern.followers
+        return keep_together(
+            starts,
+            [pattern.at(place, 0.0) for place in range(pattern.places)],
+            lambda uav, place: _BUSY_M2 * (nodes[uav] in absent and place not in followers),
+            reach_m=pattern.reach_m,
+            random=self._random,
+        )
 
     def _mended(self, plan: Search, now_ns: int) -> Search | None:
         """The plan without the UAVs that fly home, with followers in their places, and with UAVs that have come; None
@@ -296,7 +304,8 @@ class FormationPlanner:
         holders = [0 if node in gone else node for node in plan.nodes]
         for node, member in sorted(self._members.items()):
             vacant = [place for place, holder in enumerate(holders) if self._is_up_for_grabs(holder, now_ns)]
-            if vacant and node not in holders and not member.leaves and now_ns - member.heard_ns <= _LOST_NS:
+            is_new = node <= MOST_PLACED and node not in holders and not member.leaves
+            if vacant and is_new and now_ns - member.heard_ns <= _LOST_NS:
                 holders[min(vacant, key=lambda place: _distance2(pattern.at(place, 0.0), member.position))] = node
         _fill(holders, pattern)
         anew = self._for_those_who_stay(pattern, holders, now_ns)

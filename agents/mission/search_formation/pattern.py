@@ -61,9 +61,7 @@ class Pattern:
         return Pattern(self.dimensions, reach_m=self.reach_m, vacant=vacant)
 
     def begun_around(self, positions: Sequence[Enu]) -> "list[Pattern]":
-        """The formation as it may begin around a swarm that stands spread about the middle, the largest first; as it is
-        if it does not begin so.
-        """
+        """The formations in which a swarm that stands there may begin, the fastest first."""
         begun = self._whole.begun_around(swarm_at(positions, reach_m=self.reach_m))
         return [Pattern(dimensions, reach_m=self.reach_m) for dimensions in begun] or [self]
 

@@ -101,7 +101,7 @@ PAIRS = [
     (SPIRAL, SPIRAL._replace(lanes=0, nodes=(1,))),
     (LINES._replace(teams=4, nodes=(0,) * 10), LINES._replace(teams=3, nodes=(0,) * 8)),
     (LINES, LINES._replace(lanes=1, nodes=(0,) * 4)), (LINES, LINES._replace(teams=0, nodes=(0,) * 2)),
-    (LINES._replace(lanes=38, followers=2, nodes=(0,) * 79), LINES._replace(lanes=39, nodes=(0,) * 79)),
+    (LINES._replace(lanes=98, followers=3, nodes=(0,) * 200), LINES._replace(lanes=100, nodes=(0,) * 200)),
     *bounds(SCHEDULE, "leader", *IDS), *bounds(SCHEDULE, "start_us", INSTANT),
     *bounds(SCHEDULE, "period_us", (300, 299)),
     *bounds(SCHEDULE, "slot_us", (100, 101), (1, 0)), *bounds(SCHEDULE, "clusters", (3, 0), (3, 2)),

@@ -204,6 +204,11 @@ class Swarm(NamedTuple):
     reach_m: float
 
     @property
+    def hop_m(self) -> float:
+        """The greatest distance of two neighboring relays."""
+        return _WIDE * self.reach_m
+
+    @property
     def apart_m(self) -> float:
         """How far neighbors are apart, as in a square grid of the same size."""
         east_m, west_m, north_m, south_m = self.sides_m

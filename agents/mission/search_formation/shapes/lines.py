@@ -227,28 +227,13 @@ class Lines(Shape):
         return Lines(formation, most_m=most_m, widest_m=widest_m, gaps_m=gaps_m, joints=joints)
 
     def begun_around(self, swarm: Swarm) -> tuple[Dimensions, ...]:
-        """Two lines that begin beyond the swarm or nearer, the farthest first; none unless it stands densely
-        enough to hear everybody between.
+        """These lines, if they are more than two, then fewer of them; at last two that begin beyond the swarm or
+        nearer, the farthest first, if it stands densely enough to hear everybody between.
         """
         made = self._formation
-        east_m, west_m, north_m, south_m = swarm.sides_m
-        aside_m, beyond_m = (east_m + west_m) / 2, min(north_m, south_m)
-        if made.teams != 2 or made.lanes < _LEAST_BENT or beyond_m <= FIRST_M:
-            return ()
-        if swarm.apart_m > _DENSE * swarm.reach_m:
-            return ()
-        most_m = max(made.first_m, min(beyond_m + _BEYOND_M, made.last_m / 2, _AROUND * swarm.reach_m))
-        narrower_m = max(0.0, made.half_width_m - _WIDER * aside_m)
-        shares = [step / _STEPS for step in range(_STEPS, 0, -1)]
-        found = []
-        for share in shares:
-            first_m = made.first_m + share * (most_m - made.first_m)
-            for narrow in (*shares, 0.0):
-                begun = made._replace(first_m=first_m, narrower_m=narrow * narrower_m)
-                if Lines(begun).bends_within(_BENT_HOP * swarm.reach_m):
-                    found.append(begun)
-                    break
-        return tuple(found)
+        more = tuple(_in_lines(made, of_half, swarm.hop_m) for of_half in range(made.teams // 2, 1, -1))
+        two = _in_lines(made, 1, swarm.hop_m) if more else made
+        return more + (_around(two, swarm) or ((two,) if more else ()))
 
     def bends_within(self, hop_m: float) -> bool:
         """True if neighbors in the first sweep are always this near to each other; both ends of a line are alike."""
@@ -330,6 +315,26 @@ def _is_bent(formation: Dimensions) -> bool:
     return formation.first_m > FIRST_M
 
 
+def _around(made: Dimensions, swarm: Swarm) -> tuple[Dimensions, ...]:
+    """Two lines as they may begin around a swarm, the farthest from the middle first."""
+    east_m, west_m, north_m, south_m = swarm.sides_m
+    aside_m, beyond_m = (east_m + west_m) / 2, min(north_m, south_m)
+    if made.lanes < _LEAST_BENT or beyond_m <= FIRST_M or swarm.apart_m > _DENSE * swarm.reach_m:
+        return ()
+    most_m = max(made.first_m, min(beyond_m + _BEYOND_M, made.last_m / 2, _AROUND * swarm.reach_m))
+    narrower_m = max(0.0, made.half_width_m - _WIDER * aside_m)
+    shares = [step / _STEPS for step in range(_STEPS, 0, -1)]
+    found = []
+    for share in shares:
+        first_m = made.first_m + share * (most_m - made.first_m)
+        for narrow in (*shares, 0.0):
+            begun = made._replace(first_m=first_m, narrower_m=narrow * narrower_m)
+            if Lines(begun).bends_within(_BENT_HOP * swarm.reach_m):
+                found.append(begun)
+                break
+    return tuple(found)
+
+
 def fitted(count: int, demands: Demands) -> Dimensions | None:
     """As many lines as can sweep a square area in one piece; None if they are too few for two. Those too few to reach
     `EDGE_M` turn where all beyond are heard, so much slower that more UAVs need no more time.
@@ -346,17 +351,22 @@ def fitted(count: int, demands: Demands) -> Dimensions | None:
             continue
         first = min(FIRST_M, (half - edge) / 2)
         speed_m_s = (half - edge - first) / swept * demands.speed_m_s
-        apart = (half - edge - first) / of_half
-        relays = _relays(2 * (first + apart), demands.hop_m) + 2 * (of_half - 1) * _relays(apart, demands.hop_m)
-        followers = count - 2 * of_half * lanes - relays
-        if followers < 0:
-            continue
-        if of_half == 1 or (apart >= _LEAST_APART_M and followers >= _FREE):
-            found = Dimensions(
-                lanes, relays, followers, half_width, first, first + apart, demands.height_m, speed_m_s,
-                teams=2 * of_half,
-            )  # fmt: skip
+        two = Dimensions(
+            lanes, 0, count - 2 * lanes, half_width, first, half - edge, demands.height_m, speed_m_s
+        )  # fmt: skip
+        made = _in_lines(two, of_half, demands.hop_m)
+        apart_m = made.last_m - first
+        if made.followers >= 0 and (of_half == 1 or (apart_m >= _LEAST_APART_M and made.followers >= _FREE)):
+            found = made
     return found
+
+
+def _in_lines(made: Dimensions, of_half: int, hop_m: float) -> Dimensions:
+    """The same UAVs in so many lines on each side of the middle."""
+    apart_m = (made.last_m - made.first_m) * (made.teams // 2) / of_half
+    relays = _relays(2 * (made.first_m + apart_m), hop_m) + 2 * (of_half - 1) * _relays(apart_m, hop_m)
+    followers = made.places - 2 * of_half * made.lanes - relays
+    return made._replace(relays=relays, followers=followers, last_m=made.first_m + apart_m, teams=2 * of_half)
 
 
 def _relays(gap_m: float, hop_m: float) -> int:

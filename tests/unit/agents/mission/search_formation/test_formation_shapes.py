@@ -571,7 +571,7 @@ def test_a_chain_ends_at_whoever_flies_nearest_once_its_line_has_closed_ranks() 
     [
         {"shape": 6}, {"shape": 5, "teams": 1, "lanes": 4, "last_m": 99.0}, {"teams": 3},
         {"shape": 1, "teams": 0}, {"shape": 2, "relays": 1}, {"shape": 1, "first_m": 0.5},
-        {"shape": 2, "half_width_m": 0.5}, {"shape": 2, "teams": 40}, {"lanes": 1},
+        {"shape": 2, "half_width_m": 0.5}, {"shape": 2, "teams": 101}, {"lanes": 1},
     ],
 )  # fmt: skip
 def test_a_formation_that_nobody_could_fly_is_refused(impossible: dict[str, float]) -> None:

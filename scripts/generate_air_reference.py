@@ -25,6 +25,8 @@ TYPES: Final = {
     "int8_t": "b",
     "float": "f",
 }
+SHORTER: Final = {"FANET_CHUNK": "17-", "FANET_ROUTING": "17-", "FANET_SEARCH": "57-", "FANET_ROLL": "22-"}
+"""The least lengths of messages whose length depends on their content."""
 PART: Final = re.compile(
     r"(<!-- fields: (\w+) by scripts/generate_air_reference.py -->\n).*?(<!-- end of \2 -->\n)", re.DOTALL
 )
@@ -59,7 +61,7 @@ def listed(entries: Mapping[str, ET.Element]) -> str:
     text = ["| id | message | bytes on the air | what |", "|---|---|---|---|"]
     for spec in sorted(wire.SPECS, key=lambda spec: spec.msgid):
         name, most = fanet.mavlink_map[spec.msgid].msgname, spec.layout.size + wire.OVERHEAD
-        least = "17-" if name in ("FANET_CHUNK", "FANET_ROUTING") else ""
+        least = SHORTER.get(name, "")
         first = re.split(r"(?<=\w)[.;] ", f"{entries[name].findtext('description')} ")[0]
         text.append(f"| {spec.msgid} | `{name}` | {least}{most} | {first} |")
     return "\n".join(text) + "\n"

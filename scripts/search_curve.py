@@ -34,7 +34,7 @@ from sim.world.environment.layout import positions  # noqa: E402
 OUT: Final = ROOT / "docs" / "explanation" / "search-curve.png"
 AIR: Final = ("nodes.spacing_m=100",)
 BASE: Final = ("nodes.on_ground=true", "nodes.spacing_m=15", "world.base_m=[0,-600]")
-COUNTS: Final = (*range(1, 21), 25, 30, 35, 40, 45, 50, 60, 70, 79)
+COUNTS: Final = (*range(1, 21), 25, 30, 35, 40, 45, 50, 60, 70, 80, 90, 100)
 DEPLOY_M_S: Final = 9.0
 """The speed at which the planner lets UAVs fly to their places."""
 STEP_S: Final = 1.0

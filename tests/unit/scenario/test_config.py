@@ -141,9 +141,9 @@ def test_a_search_of_phones_that_are_hardly_received_is_refused_for_them_too() -
 
 
 def test_an_area_that_no_plan_can_name_enough_uavs_for_is_refused_and_a_spiral_searches_it_with_any() -> None:
-    wide = ["nodes.count=45", "world.area_m=15000"]
+    wide = ["nodes.count=45", "world.area_m=40000"]
     for search in ("lines", "sectors"):
-        with pytest.raises(ConfigError, match=r"needs more than 79 UAVs .* a plan names at most 79"):
+        with pytest.raises(ConfigError, match=r"needs more than 200 UAVs .* a plan names at most 200"):
             catalog.find("rescue", [*wide, f"mission.search={search}"])
     assert catalog.find("rescue", [*wide, "mission.search=spiral"]).mission.search == "spiral"
 

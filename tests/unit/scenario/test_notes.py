@@ -130,9 +130,9 @@ def test_a_swarm_that_hears_nobody_or_starts_outside_its_area_is_noted(changes: 
 
 def test_uavs_for_whom_the_plan_has_no_place_are_noted() -> None:
     few = ["world.area_m=1000", "nodes.spacing_m=50"]
-    assert notes(catalog.find("rescue", [*few, "nodes.count=79"])) == []
-    (said,) = notes(catalog.find("rescue", [*few, "nodes.count=82"]))
-    assert said.startswith("nodes.count = 82: the plan of a search has 79 places; 3 of the UAVs will get none")
+    assert notes(catalog.find("rescue", [*few, "nodes.count=200"])) == []
+    (said,) = notes(catalog.find("rescue", [*few, "nodes.count=203"]))
+    assert said.startswith("nodes.count = 203: the plan of a search has 200 places; 3 of the UAVs will get none")
 
 
 @pytest.mark.parametrize(

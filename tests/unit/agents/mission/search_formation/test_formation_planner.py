@@ -127,6 +127,49 @@ def test_a_plan_gives_everyone_a_place_and_the_swarm_stays_in_one_piece_on_the_w
         assert is_one(places), share
 
 
+def grid(count: int, columns: int, apart_m: float) -> dict[int, Enu]:
+    """Where UAVs of a grid around the middle stand, by id."""
+    rows = -(-count // columns)
+    return {
+        at + 1: Enu(apart_m * (at % columns - (columns - 1) / 2), apart_m * (at // columns - (rows - 1) / 2), 50)
+        for at in range(count)
+    }
+
+
+@pytest.mark.parametrize(
+    ("swarm", "area_m", "lines"),
+    [
+        (grid(40, 8, 100.0), 1000.0, 4),  # they fly to four lines as one network
+        (grid(110, 11, 200.0), 4000.0, 2),  # to four they would come apart
+        ({node: at._replace(north=9e3 * (node % 2)) for node, at in grid(40, 8, 100.0).items()}, 1000.0, 4),
+    ],
+)
+def test_uavs_fly_in_as_many_lines_as_they_reach_in_one_piece_and_in_most_if_they_are_torn_anyway(
+    swarm: dict[int, Enu], area_m: float, lines: int
+) -> None:
+    planner = planner_of(1, expected=len(swarm))
+    for node, at in swarm.items():
+        planner.status(SearchStatus(0, at, node, 0, 100), now_ns=0)
+    assert planner.review(fitted(len(swarm), DEMANDS._replace(area_m=area_m)), now_ns=S)
+    plan = planner.plan
+    assert plan is not None
+    assert (plan.teams, sorted(plan.nodes)) == (lines, list(swarm))
+    begun = pattern_of(plan, reach_m=REACH_M)
+    if lines == 2:
+        assert is_one([begun.at(place, begun.shape.sweep_s) for place in range(begun.places)]), "relays suffice"
+
+
+def test_a_uav_that_one_byte_cannot_name_gets_no_place() -> None:
+    planner = planner_of(1, expected=6)
+    swarm = dict(zip((1, 2, 3, 255, 256, 300), grid(6, 3, 100.0).values(), strict=True))
+    for node, at in swarm.items():
+        planner.status(SearchStatus(0, at, node, 0, 100), now_ns=0)
+    assert planner.review(of_few(6, DEMANDS._replace(area_m=400)), now_ns=S)
+    assert planner.plan is not None
+    assert sorted(node for node in planner.plan.nodes if node) == [1, 2, 3, 255]
+    assert not planner.review(of_few(6, DEMANDS._replace(area_m=400)), now_ns=60 * S), "nor a vacant one later"
+
+
 @pytest.mark.parametrize(("apart_m", "waits_s"), [(200.0, 0.0), (190.0, 7.0)])
 def test_lines_around_a_swarm_begin_when_each_is_there_and_could_have_visited_who_is_near_it(
     apart_m: float, waits_s: float

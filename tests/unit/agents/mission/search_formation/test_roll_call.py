@@ -142,7 +142,7 @@ def test_a_roll_of_no_plan_is_refused() -> None:
         with pytest.raises(MalformedFrameError):
             told_in(bytes(HEADER_BYTES) + wrong.encode_frame(3))[0]
     with pytest.raises(LocalProtocolError):
-        Roll(1, 1, 1, (0,) * 80, frozenset()).encode_frame(3)
+        Roll(1, 1, 1, (0,) * 201, frozenset()).encode_frame(3)
 
 
 def test_who_says_that_it_falls_is_lost_at_once_and_who_is_heard_again_in_flight_is_not() -> None:

@@ -6,7 +6,7 @@ neither numpy nor the core until it is used.
 
 import contextlib
 import importlib
-from collections.abc import AsyncIterator, Callable
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -38,15 +38,8 @@ def _emulator(module: str) -> Any:  # noqa: ANN401  (a module)
 @pytest.fixture
 def swarm() -> MakeSwarm:
     """`swarm(scenario, applications=..., seed=..., overrides=[...])`: a swarm in virtual time, as a context manager."""
-    module = _emulator("sim.run.virtual_swarm")
-
-    @contextlib.asynccontextmanager
-    async def make(scenario: object, **more: object) -> AsyncIterator["VirtualSwarm"]:
-        made = module.VirtualSwarm(scenario, **more)
-        yield made
-        made.result()  # whatever the test looked at, the run ends in order
-
-    return make
+    made: MakeSwarm = _emulator("sim.run.virtual_swarm").VirtualSwarm
+    return made
 
 
 @pytest.fixture

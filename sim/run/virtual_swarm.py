@@ -2,11 +2,12 @@
 
 import asyncio
 import contextlib
+import inspect
 import math
 import time
 from collections.abc import AsyncIterator, Callable, Collection, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, Final, Self, TypeVar
 
 from agents.clock.clocked_uav import ClockedUav
 from agents.program.attached import Drive, NodeClosedError
@@ -114,7 +115,9 @@ class _VirtualDrive:
 
 
 class VirtualSwarm:
-    """A whole swarm in virtual time, which passes only while a task waits for something."""
+    """A whole swarm in virtual time, which passes only while a task waits for something. `async with` ends the run
+    with its block; without it `result` does.
+    """
 
     def __init__(
         self,
@@ -131,6 +134,14 @@ class VirtualSwarm:
         self._began_s = time.perf_counter()
         self._result: Result | None = None
 
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None:
+            self.result()  # whatever the block looked at, the run ends in order
+        self._time.ended = True
+
     # --- time -----------------------------------------------------------------------------------------------------
 
     @property
@@ -144,6 +155,8 @@ class VirtualSwarm:
         Other tasks of the program run meanwhile. Time never passes the scenario's end: what is later, or not true by
         then, raises.
         """
+        if inspect.iscoroutinefunction(wanted):
+            raise ConfigError(f"wanted = {wanted!r} must be no async function: what it returns is always true")
         wanted_ns = self.scenario.duration_ns if callable(wanted) else _ns("wanted", wanted)
         until_ns = min(wanted_ns, self.scenario.duration_ns)
         if timeout_s is not None:
@@ -174,7 +187,7 @@ class VirtualSwarm:
         if self._time.observed is not None:
             raise ConfigError(f"node {node} must be joined before time passes; it is {self.now_s:g} s")
         if node not in self.scenario.node_ids:
-            raise ConfigError(f"node = {node}: must be in [1, {self.scenario.last_id}]")
+            raise ConfigError(f"node = {node!r}: must be in [1, {self.scenario.last_id}]")
         self._time.joined.setdefault(node, []).extend(applications)
         return _VirtualDrive(self._time, node)
 

@@ -109,6 +109,36 @@ async def test_time_is_what_can_pass_and_ends(swarm: MakeSwarm) -> None:
             await s.run_for(1)
 
 
+async def test_a_virtual_swarm_is_a_context_manager_that_ends_its_run() -> None:
+    reported: list[int] = []
+
+    class Reporter(fanet_mw.Application):
+        def report(self) -> dict[str, int]:
+            reported.append(self.port.node)
+            return {}
+
+    async with fanet_mw.VirtualSwarm("quick", overrides=QUIET, applications=lambda _: [Reporter()]) as swarm:
+        node = swarm.node(1)
+        await swarm.run_until(2)
+        assert not reported
+    assert reported, "the run has ended in order"
+    assert swarm.result().summary["simulated_s"] == 2
+    with pytest.raises(fanet_mw.NodeClosedError):
+        await node.receive()
+    with pytest.raises(KeyError):
+        async with fanet_mw.VirtualSwarm("quick", overrides=QUIET) as swarm:
+            raise KeyError("of the program")
+
+
+async def test_what_is_always_true_is_nothing_to_wait_for(swarm: MakeSwarm) -> None:
+    async def wanted() -> bool:
+        return False
+
+    async with swarm("quick", overrides=QUIET) as s:
+        with pytest.raises(fanet_mw.ConfigError, match="must be no async function"):
+            await s.run_until(wanted)  # type: ignore[arg-type]
+
+
 async def test_a_node_whose_program_the_scenario_stops_knows_nothing_and_goes_on_when_it_is_started_again(
     swarm: MakeSwarm,
 ) -> None:

@@ -152,7 +152,14 @@ def test_ports_at_which_nothing_could_arrive_are_refused(make_scenario: MakeScen
 
 @pytest.mark.parametrize(
     ("attribute", "value"),
-    [("listens", "HEARTBEAT"), ("listens", (1 << 24,)), ("follows", "sent"), ("follows", ("seen",)), ("name", 5)],
+    [
+        ("listens", b"\x07"),
+        ("listens", "HEARTBEAT"),
+        ("listens", (1 << 24,)),
+        ("follows", "sent"),
+        ("follows", ("seen",)),
+        ("name", 5),
+    ],
 )
 def test_attributes_that_mean_nothing_are_refused_with_the_class(
     make_scenario: MakeScenario, attribute: str, value: Any

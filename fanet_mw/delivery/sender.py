@@ -6,6 +6,7 @@ cut into pieces of `stride` bytes and the rest; a MAVLink frame is never cut. Th
 """
 
 import heapq
+import itertools
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -31,6 +32,11 @@ class Fragments(NamedTuple):
     stride: int
     """The number of bytes of each piece but the last."""
     pieces: int
+
+    @property
+    def whole(self) -> int:
+        """All pieces, as bits."""
+        return (1 << self.pieces) - 1
 
     def part(self, data: bytes, piece: int) -> bytes:
         return data[piece * self.stride : (piece + 1) * self.stride]
@@ -84,25 +90,27 @@ _LEAST: Final = 2
 
 class SendWindow:
     """Which confirmed messages may be sent now, so that what is under way never fills all queues: the most urgent
-    first, then the oldest (repetitions: those repeated least). First transmissions and repetitions each have a window,
-    halved at a repetition, one more when a target has all of a message (RFC 5681).
+    first, then the oldest (repetitions: those for which a target waits, then those repeated least). First transmissions
+    and repetitions each have a window, halved at a repetition, one more when a target has all of a message (RFC 5681).
     """
 
     def __init__(self) -> None:
         self._pieces = _MOST
-        self._waiting: tuple[list[tuple[int, int, int]], ...] = ([], [])
-        """Heaps of (priority, times sent, number) of the messages that were never sent, and of all others."""
+        self._waiting: tuple[list[tuple[int, bool, int, int]], ...] = ([], [])
+        """Heaps of (priority, behind another, times sent, number) of the messages that were never sent, and of all
+        others."""
         self._under_way = [0, 0]
         """The number of pieces of first transmissions and of repetitions for which receipts are awaited."""
 
-    def wait(self, number: int, *, priority: int, rounds: int) -> None:
-        heapq.heappush(self._waiting[rounds > 0], (priority, rounds, number))
+    def wait(self, number: int, *, priority: int, rounds: int, behind: bool = False) -> None:
+        """`behind`: all its targets wait for messages before it. One that waits already may be moved to the front."""
+        heapq.heappush(self._waiting[rounds > 0], (priority, behind, rounds, number))
 
     def next(self) -> int | None:
-        """Take out the message to send now; None if there is none, or no room."""
+        """Take out the message to send now, which may have been sent since; None if there is none, or no room."""
         for waiting, under_way in zip(self._waiting, self._under_way, strict=True):
             if waiting and under_way < self._pieces:
-                return heapq.heappop(waiting)[2]
+                return heapq.heappop(waiting)[-1]
         return None
 
     def sent(self, pieces: int, *, rounds: int) -> None:
@@ -175,10 +183,19 @@ class _OutgoingMessage:
     last_seq: int | None = None
     """The sequence number of that packet."""
     rounds: int = 0
+    unanswered: int = 0
+    """The number of rounds since a target has last answered."""
+    put_off: bool = False
+    """True while it takes up no room in the window, because its targets have all of it and wait for one before it."""
 
     @property
     def until_ns(self) -> int:
         return self.born_us * US + self.lifetime_ms * MS
+
+    @property
+    def waits(self) -> bool:
+        """True if it waits for room in the window to be sent again."""
+        return self.rounds > 0 and not self.again_ns
 
 
 class Sender:
@@ -285,22 +302,46 @@ class Sender:
         message = self._messages.get(receipt.number)
         if message is None or origin not in message.lacking:
             return
-        if message.rounds == 1:  # after a repetition it is not known which copy the receipt answers
+        if message.rounds == 1 and not message.lacking[origin]:  # of a repetition the copy that is answered is unknown
             self._round_trips.measured(origin, now_ns - message.sent_ns)
         if receipt.outcome == application_message.MISSING:
-            message.lacking[origin] |= receipt.held & ((1 << message.fragments.pieces) - 1)
+            message.lacking[origin] |= receipt.held & message.fragments.whole
+            self._on_answer(message, origin, now_ns)
             return
         del message.lacking[origin]
         self._window.widen()
         self.told.append(Told(message.number, receipt.outcome, (origin,), last=not message.lacking))
+        self._move_up(message, origin)
         if not message.lacking:
             self._close(message)
 
+    def _on_answer(self, message: _OutgoingMessage, target: NodeId, now_ns: int) -> None:
+        """A silent target answers: what it lacks is not sent later than a first repetition would be."""
+        message.unanswered = 0
+        soon_ns = max(now_ns, message.sent_ns + self._round_trips.wait_ns(target))
+        if not message.put_off and soon_ns < message.again_ns:
+            message.again_ns = soon_ns
+            heapq.heappush(self._timers, (soon_ns, message.number))
+
+    def _move_up(self, message: _OutgoingMessage, target: NodeId) -> None:
+        """Let the next message of the flow that a target lacks go before those for which nobody waits."""
+        later = (self._messages[number] for number in message.flow.open if number > message.number)
+        after = next((one for one in later if target in one.lacking), None)
+        if after is not None and after.waits and not self._before(after, target):
+            self._window.wait(after.number, priority=after.priority, rounds=after.rounds)
+
+    def _before(self, message: _OutgoingMessage, target: NodeId) -> bool:
+        """True if this target lacks an earlier message of the flow."""
+        earlier = itertools.takewhile(lambda number: number < message.number, message.flow.open)
+        return any(target in self._messages[number].lacking for number in earlier)
+
     def _close(self, message: _OutgoingMessage) -> None:
+        for target in message.lacking:
+            self._move_up(message, target)
         del self._messages[message.number]
         message.flow.open.remove(message.number)
         self._kept_bytes -= len(message.data)
-        if message.again_ns:
+        if message.again_ns and not message.put_off:
             self._window.over(message.fragments.pieces, rounds=message.rounds)
 
     # --- out ------------------------------------------------------------------------------------------------------
@@ -317,20 +358,31 @@ class Sender:
             elif 0 < message.again_ns <= now_ns and message.last_seq is not None and self._holds(message.last_seq):
                 self._await_receipts(message, now_ns)
             elif 0 < message.again_ns <= now_ns:
-                self._window.over(message.fragments.pieces, rounds=message.rounds)
-                message.again_ns = 0
-                self._window.halve()
-                self._window.wait(number, priority=message.priority, rounds=message.rounds)
+                self._send_again(message, now_ns)
         packets: list[PieceToSend] = []
         while (ready := self._window.next()) is not None:
             message = self._messages.get(ready)
-            if message is not None:
+            if message is not None and not message.again_ns:
                 packets += self._round(message, now_ns)
         return packets
 
+    def _send_again(self, message: _OutgoingMessage, now_ns: int) -> None:
+        """Let a message wait for room in the window; put it off if that would bring its targets nothing."""
+        if not message.put_off:
+            self._window.over(message.fragments.pieces, rounds=message.rounds)
+        behind = [self._before(message, target) for target in message.lacking]
+        held = all(pieces == message.fragments.whole for pieces in message.lacking.values())
+        message.put_off = held and all(behind)
+        if message.put_off:
+            self._be_patient(message, now_ns)
+            return
+        message.again_ns = 0
+        self._window.halve()
+        self._window.wait(message.number, priority=message.priority, rounds=message.rounds, behind=all(behind))
+
     def _round(self, message: _OutgoingMessage, now_ns: int) -> list[PieceToSend]:
         """All pieces the first time, later those lacked; a silent target, or one with all, gets the last one again."""
-        whole, last = (1 << message.fragments.pieces) - 1, 1 << (message.fragments.pieces - 1)
+        whole, last = message.fragments.whole, 1 << (message.fragments.pieces - 1)
         unknown = last if message.rounds else whole
         wanted = {target: (whole & ~held or last) if held else unknown for target, held in message.lacking.items()}
         alone, together = self._divided(wanted)
@@ -346,6 +398,7 @@ class Sender:
         else:
             packets[0] = packets[0]._replace(first=True)
         message.rounds += 1
+        message.unanswered += 1
         message.last_seq = None
         self._window.sent(message.fragments.pieces, rounds=message.rounds)
         self._await_receipts(message, now_ns)
@@ -366,12 +419,15 @@ class Sender:
 
     def _await_receipts(self, message: _OutgoingMessage, now_ns: int) -> None:
         message.sent_ns = now_ns
+        self._be_patient(message, now_ns)
+
+    def _be_patient(self, message: _OutgoingMessage, now_ns: int) -> None:
         message.again_ns = now_ns + self._patience_ns(message)
         heapq.heappush(self._timers, (message.again_ns, message.number))
 
     def _patience_ns(self, message: _OutgoingMessage) -> int:
         most_ns = max(map(self._round_trips.wait_ns, message.lacking), default=0)
-        return most_ns << min(message.rounds - 1, _MOST_DOUBLINGS)
+        return most_ns << max(0, min(message.unanswered - 1, _MOST_DOUBLINGS))
 
     def _previous(self, message: _OutgoingMessage, readers: tuple[NodeId, ...]) -> int:
         """The youngest open message of its flow before this that a reader still lacks, or 0. A reader that has

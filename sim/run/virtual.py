@@ -356,7 +356,8 @@ class StoppableUav(Actor):
         for life in lives[:-1]:
             for key in ("frames_sent", "receptions", "generated"):
                 summed[key] = summed.get(key, 0) + life.get(key, 0)
-            dropped = Counter(summed.get("dropped", {}))
-            dropped.update(life.get("dropped", {}))
-            summed["dropped"] = dict(dropped)
+            for key in ("dropped", "messages"):
+                counts = Counter(summed.get(key, {}))
+                counts.update(life.get(key, {}))
+                summed |= {key: dict(counts)} if counts else {}
         return summed

@@ -174,6 +174,17 @@ def test_every_message_arrives_once_whole_and_in_order_or_its_sender_is_told_who
     assert figures["acknowledged"] > 0.97 * figures["copies"]
 
 
+def test_who_was_out_of_reach_for_ten_seconds_soon_has_all_that_was_sent_meanwhile_in_order(
+    make_scenario: MakeScenario,
+) -> None:
+    faults = [{"at_s": 5, "kind": "cut", "node": 9, "for_s": 10}]
+    scenario = make_scenario(**{**KEYS, "faults": faults, "routing.protocol": "flooding", "duration_s": 25})
+    given = {node: list[Letter]() for node in scenario.node_ids}
+    given[1] = [Letter((2 + 2 * n) * S, PORTS[0], bytes([n]) * 3000, NodeId(9), 3) for n in range(9)]
+    mails, _ = run(scenario, given)
+    assert [message.data[0] for message in mails[9].got] == [*range(9)]
+
+
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
 def test_ten_thousand_messages_arrive_once_whole_and_in_order_or_their_senders_are_told(

@@ -273,6 +273,68 @@ def test_of_repetitions_those_go_first_that_were_repeated_least() -> None:
     assert again.index(young) < again.index(old) if old in again else young in again
 
 
+def test_of_messages_to_one_target_the_one_goes_first_for_which_it_waits_however_often_it_was_repeated() -> None:
+    sender = made()
+    old = send(sender, bytes(700), lifetime_ms=600_000)
+    for second in range(60):
+        sender.due(BORN_NS + second * S)
+    young = send(sender, bytes(700), lifetime_ms=600_000)
+    sender.due(BORN_NS + 60 * S)
+    at_ns = BORN_NS + 80 * S  # both are due; the window is at its least
+    assert {packet.number for packet in sender.due(at_ns)} == {old}
+    delivered(sender, old, A, at_ns)
+    assert {packet.number for packet in sender.due(at_ns)} == {young}
+
+
+def test_when_a_target_has_a_message_the_next_one_goes_before_those_of_a_target_that_is_gone() -> None:
+    sender = made()
+    first, second = send(sender, bytes(700), lifetime_ms=600_000), send(sender, bytes(700), lifetime_ms=600_000)
+    sender.confirmed(bytes(700), port=6, targets=(B,), priority=3, born_us=BORN_NS // US, lifetime_ms=600_000)
+    for each in range(60):
+        sender.due(BORN_NS + each * S)
+    at_ns = BORN_NS + 80 * S
+    sender.due(at_ns)
+    delivered(sender, first, A, at_ns + S)
+    later = [p.number for each in range(1, 20) for p in sender.due(at_ns + each * S)]
+    assert later[0] == second
+
+
+def test_a_message_that_its_target_has_and_keeps_back_for_one_before_it_is_not_sent_again() -> None:
+    sender = made()
+    first, second = send(sender, bytes(700)), send(sender, bytes(700))
+    sender.due(BORN_NS)
+    sender.receipt(A, Receipt(0b111, second, MISSING), BORN_NS + 100 * MS)
+    later = [p for at_ns in range(BORN_NS, BORN_NS + 40 * S, S) for p in sender.due(at_ns)]
+    assert {packet.number for packet in later} == {first}
+    delivered(sender, first, A, BORN_NS + 40 * S)
+    again = [p for at_ns in range(BORN_NS + 40 * S, BORN_NS + 57 * S, S) for p in sender.due(at_ns)]
+    assert {packet.number for packet in again} == {second}, "its own receipt was lost"
+
+
+def test_a_target_that_answers_after_a_long_silence_is_soon_sent_what_it_lacks() -> None:
+    sender, at_ns = made(), BORN_NS
+    number = send(sender, bytes(1000))
+    for _ in range(4):
+        sender.due(at_ns)
+        at_ns = sender.next_wake_ns() or 0
+    sender.due(at_ns)
+    sender.receipt(A, Receipt(0b1000, number, MISSING), at_ns + 100 * MS)
+    assert sender.next_wake_ns() == at_ns + WAIT_NS, "without the doublings"
+    assert pieces(sender.due(at_ns + WAIT_NS)) == [0, 1, 2]
+
+
+def test_a_message_that_was_kept_back_teaches_nothing_about_how_long_receipts_take() -> None:
+    sender = made()
+    first = send(sender)
+    sender.due(BORN_NS)
+    sender.receipt(A, Receipt(0b1, first, MISSING), BORN_NS + 400 * MS)
+    delivered(sender, first, A, BORN_NS + 1900 * MS)
+    at_ns = BORN_NS + 2 * S
+    send(sender)
+    sender.due(at_ns)
+    assert sender.next_wake_ns() == at_ns + 1200 * MS, "400 ms and four times 200, as of one receipt"
+
+
 def test_a_repetition_halves_the_window_and_a_target_that_has_all_widens_it_by_one() -> None:
     sender = made()
     numbers = [send(sender) for _ in range(100)]

@@ -1,5 +1,8 @@
 """A UAV's program in virtual time ends when it is told to, and is silent from then on."""
 
+from collections.abc import Mapping
+from typing import Any
+
 from fanet_mw.actor import Actor
 from fanet_mw.bus.messages import Message
 from fanet_mw.hosts.virtual import VirtualHost
@@ -8,7 +11,7 @@ from sim.run.virtual import StoppableUav
 
 
 class Ticking(Actor):
-    """Acts once a second, and remembers when."""
+    """Acts once a second, and remembers when; each act is a message that was sent."""
 
     def __init__(self) -> None:
         super().__init__("ticking", ())
@@ -26,6 +29,9 @@ class Ticking(Actor):
     def next_wake_ns(self) -> int:
         return (len(self.at_s) + 1) * S
 
+    def report(self) -> Mapping[str, Any]:
+        return {"frames_sent": len(self.at_s), "messages": {"sent": len(self.at_s)}}
+
 
 def test_a_program_ends_while_it_runs() -> None:
     inner = Ticking()
@@ -37,3 +43,14 @@ def test_a_program_ends_while_it_runs() -> None:
     host.nudge(uav)
     host.run(6 * S)
     assert inner.at_s == [1, 2, 3]
+
+
+def test_what_a_program_has_counted_before_it_was_started_again_is_in_its_report() -> None:
+    uav = StoppableUav(Ticking, [(3 * S, 5 * S)])
+    host = VirtualHost([uav])
+    host.start()
+    host.run(6 * S)
+    report = uav.report()
+    assert uav.alive is not None
+    assert report["messages"] == {"sent": 2 + uav.alive.report()["frames_sent"]}
+    assert report["frames_sent"] == report["messages"]["sent"]

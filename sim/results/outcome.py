@@ -3,11 +3,14 @@
 import signal
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record
 from sim.results.links import LinkTotals
+
+UNHEARD: Final = "no report was heard"
+"""Why the report of an actor is missing that has sent none."""
 
 
 def described(exit_code: int) -> str:

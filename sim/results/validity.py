@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 
 from fanet_mw.scenario import Scenario
 from sim.results.bounds import broken
-from sim.results.outcome import Outcome, described
+from sim.results.outcome import UNHEARD, Outcome, described
 
 LOST_LIMIT: Final = 0.0025
 """The greatest sum of four shares: of all transmit requests those lost on the bus, dropped as too late, and turns to
@@ -111,19 +111,20 @@ def _broken(outcome: Outcome) -> Iterator[str]:
     for code in dict.fromkeys(code for _, code in outcome.ended if outcome.mode == "realtime"):
         dead = [name for name, ended in outcome.ended if ended == code]
         yield f"{_named(dead)} ended before the end, with {described(code)}: {len(dead)}, limit 0"
+    gone = {f"agent-{node}" for node in outcome.scenario.node_ids if _is_stopped_at_the_end(outcome.scenario, node)}
     for name, why in outcome.absent.items():
-        yield f"no {'last ' if name in outcome.reports else ''}report of {name} ({why}); all must report"
-    gone = {f"agent-{node}" for node in outcome.scenario.node_ids if _is_stopped_for_good(outcome.scenario, node)}
+        if name not in gone or why != UNHEARD:  # who is stopped at the start never reports
+            yield f"no {'last ' if name in outcome.reports else ''}report of {name} ({why}); all must report"
     unfinished = [name for name, report in outcome.reports.items() if not report.get("final") and name not in gone]
     unfinished = [name for name in unfinished if name not in outcome.absent]
     if unfinished and outcome.mode == "realtime":
         yield f"no last report of {_named(unfinished)}: {len(unfinished)}, limit 0"
 
 
-def _is_stopped_for_good(scenario: Scenario, node: int) -> bool:
-    """True if a fault ends the program of a node, and nothing starts it again."""
-    stops = scenario.planned_stops(node)
-    return bool(stops) and stops[-1][1] is None
+def _is_stopped_at_the_end(scenario: Scenario, node: int) -> bool:
+    """True if a fault ends the program of a node, and nothing starts it again before the end of the run."""
+    end_ns = scenario.duration_ns
+    return any(at_ns < end_ns and not (until_ns or end_ns) < end_ns for at_ns, until_ns in scenario.planned_stops(node))
 
 
 def _incomplete(outcome: Outcome) -> Iterator[str]:

@@ -80,6 +80,15 @@ def test_with_gps_too() -> None:
     assert summary["clock"]["beyond_bound"] == 0
 
 
+def test_a_post_on_the_ground_has_the_time_of_gps_as_the_uavs_have_and_only_an_outage_takes_it() -> None:
+    keys = ("clock.sync=gps", "ground.at_m=[0,-300]", "traffic.sources=3", "nodes.count=4", "clusters.count=2", *SOON)
+    assert summary_of(*keys)["clock"]["without_time"] == 0
+    worst_us = [outcome_of(*keys).reports[f"agent-{node}"]["clock"]["bound_us"] for node in (4, 5)]
+    assert worst_us[1] == pytest.approx(worst_us[0], rel=0.5)
+    without = summary_of(*keys, "sensors.gps_outages=[[0,-300,50,0,1000]]")
+    assert without["clock"]["without_time"] == 1
+
+
 def test_clocks_that_only_drift_soon_collide_and_the_summary_says_how_wrong_they_were() -> None:
     keys = ("clock.sync=none", "clusters.turn_slack_us=50", "clock.offset_ms=5", "clusters.resume=false")
     summary = summary_of(*SOON, *keys)

@@ -27,7 +27,7 @@ from sim.records.standing import Standing
 from sim.records.stored_records import RecordSpools
 from sim.records.told_faults import ToldFaults
 from sim.results.links import LinkTotals
-from sim.results.outcome import Outcome
+from sim.results.outcome import UNHEARD, Outcome
 from sim.run.collecting.running_tally import RunningTally
 from sim.run.collecting.taps import encoded_tap, taps_of
 
@@ -190,7 +190,7 @@ class Collector:
             self._keep(further)
             why = dict(sorted(self._refused.items()))
             absent = {
-                name: self._why_no_report.get(name, "no report was heard")
+                name: self._why_no_report.get(name, UNHEARD)
                 for name in self._checks.node_of
                 if name not in self._reports or (name in self._why_no_report and not self._reports[name].get("final"))
             }

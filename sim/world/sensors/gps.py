@@ -26,6 +26,39 @@ from sim.world.incidents import Mishaps
 from sim.world.sensors.contract import Drift, Sensor, Truth, generator
 
 
+class Outages:
+    """The areas and times without fixes."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._outages = [
+            (np.array([east, north]), radius, seconds_to_ns(begin_s), seconds_to_ns(end_s))
+            for east, north, radius, begin_s, end_s in scenario.sensors.gps_outages
+        ]
+
+    def out(self, at: Rows, now_ns: int) -> Flags:
+        """Which of these places have no fix."""
+        out = np.zeros(len(at), bool)
+        for place, radius_m, begin_ns, end_ns in self._outages:
+            if begin_ns <= now_ns < end_ns:
+                out |= np.linalg.norm(at[:, :2] - place, axis=1) <= radius_m
+        return out
+
+
+class PostReceiver:
+    """The receiver of the post on the ground, whose place is surveyed: it gives the time (`clock.sync = "gps"`)."""
+
+    def __init__(self, scenario: Scenario, place: Enu) -> None:
+        self._period_ns = round(S / scenario.world.gps_hz)
+        self._outages = Outages(scenario)
+        self._place = place
+
+    def readings(self, now_ns: int, *, before_ns: int) -> Iterator[Gps]:
+        """The fix of an instant in (before, now], if there is one."""
+        due = now_ns // self._period_ns > before_ns // self._period_ns
+        if due and not self._outages.out(np.array([self._place]), now_ns)[0]:
+            yield Gps(now_ns, self._place, Enu(0.0, 0.0, 0.0))
+
+
 class GpsReceiver(Sensor):
     """One receiver per UAV; all give their fixes at the same instants, as with GPS time."""
 
@@ -47,10 +80,7 @@ class GpsReceiver(Sensor):
         self._slow = np.array([1.0, 1.0, config.gps_vertical])
         self._last: tuple[int, Rows, Rows, Flags] | None = None
         self._mishaps = mishaps
-        self._outages = [
-            (np.array([east, north]), radius, seconds_to_ns(begin_s), seconds_to_ns(end_s))
-            for east, north, radius, begin_s, end_s in config.gps_outages
-        ]
+        self._outages = Outages(scenario)
 
     def read(self, truth: Truth, rows: Sequence[int]) -> Iterator[tuple[int, Message]]:
         position, velocity, out = self.fixes(truth)
@@ -65,16 +95,9 @@ class GpsReceiver(Sensor):
             slow = (self._common.at(now_ns) + self._own.at(now_ns)) * self._slow
             position = truth.at - truth.velocity * self.delay_s + slow + noise.normal(0.0, 1.0, shape) * self._sigma_m
             velocity = truth.velocity + noise.normal(0.0, self._velocity_m_s, shape)
-            out = self._out(truth)
+            out = self._outages.out(truth.at, now_ns)
             if self._mishaps is not None:
                 position += self._mishaps.offset_m
                 out |= self._mishaps.silent
             self._last = now_ns, position, velocity, out
         return self._last[1:]
-
-    def _out(self, truth: Truth) -> Flags:
-        out = np.zeros(len(truth.at), bool)
-        for place, radius_m, begin_ns, end_ns in self._outages:
-            if begin_ns <= truth.now_ns < end_ns:
-                out |= np.linalg.norm(truth.at[:, :2] - place, axis=1) <= radius_m
-        return out

@@ -10,13 +10,14 @@ from fanet_mw.units import S
 from sim.world.arrays import Flags
 from sim.world.engines.battery_drain import BatteryDrain
 from sim.world.engines.contract import Engine
+from sim.world.environment.layout import positions
 from sim.world.environment.obstacles import Obstacles
 from sim.world.environment.solids import Solids
 from sim.world.environment.survivors import Survivors
 from sim.world.sensors.altimeter import AltimeterSensor
 from sim.world.sensors.camera import CameraSensor, ImageSensor
 from sim.world.sensors.contract import Sensor, Truth
-from sim.world.sensors.gps import GpsReceiver
+from sim.world.sensors.gps import GpsReceiver, PostReceiver
 from sim.world.sensors.inertial import InertialSensor
 from sim.world.sensors.pad import PadSensor
 from sim.world.sensors.phone import PhoneSensor
@@ -110,6 +111,10 @@ class Suite:
             (sensor, [topics.sensor(node, sensor.kind) for node in scenario.uav_ids]) for sensor in sensors
         ]
         self._count = scenario.nodes.count
+        self._post: tuple[str, PostReceiver] | None = None
+        if scenario.post is not None and scenario.clock.sync == "gps":
+            receiver = PostReceiver(scenario, positions(scenario)[-1])
+            self._post = topics.sensor(scenario.post, GpsReceiver.kind), receiver
 
     @property
     def shortest_ns(self) -> int:
@@ -117,12 +122,16 @@ class Suite:
         return min((sensor.period_ns for sensor, _ in self._sensors if sensor.kind != "gps"), default=S)
 
     def readings(self, truth: Truth, alive: Flags, *, before_ns: int) -> Iterator[tuple[str, Message]]:
-        """The topics and readings of all instants in (before, now], for UAVs that are `alive`."""
+        """The topics and readings of all instants in (before, now], for UAVs that are `alive`, and for the post."""
         for sensor, topics in self._sensors:
             rows = [row for row in sensor.due(self._count, now_ns=truth.now_ns, before_ns=before_ns) if alive[row]]
             if rows:
                 for row, reading in sensor.read(truth, rows):
                     yield topics[row], reading
+        if self._post is not None:
+            topic, receiver = self._post
+            for fix in receiver.readings(truth.now_ns, before_ns=before_ns):
+                yield topic, fix
 
     def close(self) -> None:
         """Close all sensors; a second call does nothing."""

@@ -13,7 +13,7 @@ from fanet_mw.scenario import Scenario
 from fanet_mw.units import MS, Enu, NodeId, S
 from sim.results import validity
 from sim.results.metrics import summarize
-from sim.results.outcome import Outcome
+from sim.results.outcome import UNHEARD, Outcome
 from sim.results.printed_summary import show
 from sim.world.world import WorldActor
 
@@ -313,6 +313,21 @@ def test_who_is_stopped_for_good_by_a_fault_owes_no_last_report(make_scenario: A
     outcome = good(make_scenario(**{"nodes.count": 2, "faults": [{**stop, "for_s": 1}]}))
     put(outcome, "agent-2", "final", value=False)
     assert any("no last report of agent-2" in reason for reason in reasons(outcome)), "it was started again"
+
+
+def test_nor_does_who_is_started_again_after_the_end_and_who_was_stopped_at_the_start_owes_none(
+    make_scenario: Any,
+) -> None:
+    stop = {"kind": "stop", "node": 2, "at_s": 4}
+    for faults, owes in (([{**stop, "for_s": 6}], False), ([{**stop, "at_s": 10}], True)):  # the run ends at 10 s
+        outcome = good(make_scenario(**{"nodes.count": 2, "faults": faults}))
+        put(outcome, "agent-2", "final", value=False)
+        assert any("no last report of agent-2" in reason for reason in reasons(outcome)) == owes, faults
+    for at_s, why, owes in ((0, UNHEARD, False), (10, UNHEARD, True), (0, "malformed: of 9 MB", True)):
+        outcome = good(make_scenario(**{"nodes.count": 2, "faults": [{**stop, "at_s": at_s}]}))
+        outcome.absent = {"agent-2": why}
+        del outcome.reports["agent-2"]
+        assert any(f"no report of agent-2 ({why})" in reason for reason in reasons(outcome)) == owes
 
 
 @pytest.mark.parametrize(

@@ -327,7 +327,7 @@ def test_a_ring_begins_as_large_as_the_swarm_that_stands_around_the_middle_and_w
 def test_lines_begin_a_little_beyond_the_swarm_and_leave_out_only_what_it_has_heard() -> None:
     lines = formed(ShapeName.LINES)
     begun, *nearer = lines.begun_around(AROUND)
-    assert begun.dimensions == lines.dimensions._replace(first_m=520.0, narrower_m=61.875), (
+    assert begun.dimensions == lines.dimensions._replace(first_m=520.0, narrower_m=20.625), (
         "where neighbors hear each other"
     )
     assert [other.dimensions.first_m for other in nearer] == [pytest.approx(16 + 504 * k / 8) for k in range(7, 0, -1)]
@@ -344,6 +344,13 @@ def test_lines_begin_a_little_beyond_the_swarm_and_leave_out_only_what_it_has_he
     assert len(unheard) <= 0.01 * 50 * 50
 
 
+def test_cameras_of_lines_that_begin_around_the_swarm_show_the_sides_of_the_middle() -> None:
+    begun = formed(ShapeName.LINES).begun_around(AROUND)[0]
+    ends = [begun.at(place, second) for place in (0, 14, 15, 29) for second in (0, 5)]
+    for east, north in itertools.product((-1240, 1240), range(-100, 101, 10)):
+        assert min(max(abs(at.east - east), abs(at.north - north)) for at in ends) <= 65, "what a camera shows"
+
+
 def test_the_outermost_lanes_fly_to_the_sides_while_the_middle_sweeps_and_waits_at_the_edge() -> None:
     begun = formed(ShapeName.LINES).begun_around(AROUND)[0]
     aside_s = begun.dimensions.narrower_m / 9
@@ -354,8 +361,8 @@ def test_the_outermost_lanes_fly_to_the_sides_while_the_middle_sweeps_and_waits_
         ]
         for axis in ("east", "north")
     )
-    assert [east for _, east in east_m] == pytest.approx([1143.125, 1205, 1205, 1205])
-    assert [north for _, north in north_m] == pytest.approx([86, 86, 86 + 9 * (125 - aside_s), 1225], abs=1)
+    assert [east for _, east in east_m] == pytest.approx([1184.375, 1205, 1205, 1205])
+    assert [north for _, north in north_m] == pytest.approx([45, 45, 45 + 9 * (125 - aside_s), 1225], abs=1)
     assert [north for north, _ in north_m] == pytest.approx([520, 520 + 7.5 * aside_s, 1225, 1225], abs=1)
 
 

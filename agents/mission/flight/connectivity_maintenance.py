@@ -27,8 +27,8 @@ _CLOSING: Final = 0.97
 _CLOSING_S: Final = 1.0
 """The same two while ranks are closed over a lost UAV, and every second counts."""
 _FOLLOWS: Final = 0.88
-"""While the swarm is apart a UAV keeps within this share of the reach of a neighbor whose place is fewer ties from the
-other part: its whole row turns back with that neighbor rather than hold it back.
+"""While the swarm is apart a UAV keeps within this share of the reach of a neighbor that is fewer ties away from the
+other part. So a whole row turns back with the UAV at its end.
 """
 _LED: Final = 0.8
 """Before the sweep a UAV keeps within this share of the reach of a neighbor that responds, unless it is itself the
@@ -43,7 +43,7 @@ _HASTE: Final = 0.95
 """A UAV flies back into such a limit at this share of its greatest speed at most."""
 _HURRIES: Final = 0.9
 _SETS_OUT_S: Final = 2.0
-"""A UAV beyond a gap is taken to have noticed the loss after this time, and to come at this share of that speed."""
+"""A UAV beyond a gap is expected to set out so long after the loss, at `_HURRIES` of its greatest speed."""
 _UNSURE: Final = 0.7
 """A UAV of another part may be late on its way. One that should be within this share of the reach and is not heard is
 not sought where it should be.
@@ -263,8 +263,8 @@ class ConnectivityMaintenance:
         return heard[sought] or ways[sought]
 
     def _lasting(self, plan: Search, pattern: Pattern, place: int, now_ns: int) -> dict[NodeId, Motion]:
-        """The neighbors whose places are in reach of this UAV's, but those that a third UAV connects with it by two
-        strong and shorter links. A link that is too long now counts as well, because it is drawn in again.
+        """The neighbors whose places are in reach of this UAV's. Left out are those that a third UAV connects with it by
+        two links that are strong and shorter; a link that is too long now counts, because it is drawn in again.
         """
         swept_s, place_of = self._formation.swept_s(now_ns) or 0.0, {node: at for at, node in enumerate(plan.nodes)}
         present = {node: motion for node, motion in self._present(now_ns).items() if node in place_of}

@@ -2,7 +2,8 @@
 
 All leave and arrive at one instant and fly straight, so a link lasts if it exists at both ends of the way. From the
 assignment with the least sum of squared distances, pairs exchange places, at first also if that is for the worse
-(simulated annealing; Kirkpatrick, Gelatt and Vecchi, Science 220, 1983), until links that last join all UAVs. Links are
+(simulated annealing; Kirkpatrick, Gelatt and Vecchi, Science 220, 1983), until links that last join all UAVs that are
+joined at the start: who is known of but not of whom it hears is joined with nobody, and must not stop this. Links are
 bit masks, because a node can do nothing else meanwhile: 45 are mostly joined within 40 ms
 (`tests/benchmarks/keeping_together.py`).
 """
@@ -36,16 +37,14 @@ def keep_together(
     reach_m: float,
     random: Callable[[], float],
 ) -> tuple[list[int], bool]:
-    """The goal of each UAV (there are at least as many goals as UAVs), and whether links that last join all UAVs; if
-    not, the goals are those of the least sum. `dearer_m2`: the extra cost of a UAV at a goal [m2], added to its squared
+    """The goal of each UAV (there are at least as many goals as UAVs), and whether links that last join all UAVs that
+    are joined at the start; if not, the goals are those of the least sum. `dearer_m2`: the extra cost of a UAV at a goal [m2], added to its squared
     way there.
     """
     ways = [[start.horizontal_to(goal) for goal in goals] for start in starts]
     costs = [[way * way + dearer_m2(uav, goal) for goal, way in enumerate(row)] for uav, row in enumerate(ways)]
     least = assign(costs)
     links = _Links(starts, goals, list(least), LASTING * reach_m)
-    if not links.may_join:
-        return least, False
     longest_m = _LONGEST * max((ways[uav][goal] for uav, goal in enumerate(least)), default=0.0)
     allowed = [[goal for goal, way in enumerate(row) if way <= longest_m] for row in ways]
     return (links.chosen, True) if _join(links, costs, allowed, random) else (least, False)
@@ -54,11 +53,15 @@ def keep_together(
 def _join(
     links: "_Links", costs: Sequence[Sequence[float]], allowed: Sequence[Sequence[int]], random: Callable[[], float]
 ) -> bool:
-    """Exchange allowed goals until all UAVs are joined, and then to shorten ways; False if they cannot be joined."""
-    chosen, parts, left = links.chosen, links.parts(), _SHORTENED
+    """Exchange allowed goals until all UAVs are joined that are at the start, and then to shorten ways; False if they
+    cannot be joined.
+    """
+    chosen, parts, least, left = links.chosen, links.parts(), links.parts_at_start, _SHORTENED
+    if parts <= least:
+        return True  # no ways are shorter than the first ones
     holder = {goal: uav for uav, goal in enumerate(chosen)}
     for tried in range(_TRIES):
-        joined = parts <= 1
+        joined = parts <= least
         left -= joined
         if not left:
             break
@@ -73,11 +76,11 @@ def _join(
         after = _parts(masks)
         worse_m2 = (after - parts) * _PART_M2 + longer_m2
         heat_m2 = _HEAT * _PART_M2 * (1 - tried / _TRIES)
-        if after <= 1 or (not joined and (worse_m2 <= 0 or random() < math.exp(-worse_m2 / heat_m2))):
+        if after <= least or (not joined and (worse_m2 <= 0 or random() < math.exp(-worse_m2 / heat_m2))):
             links.exchange(a, b, masks)
             holder[chosen[a]], holder[chosen[b]] = a, b
             parts = after
-    return parts <= 1
+    return parts <= least
 
 
 class _Links:
@@ -118,9 +121,8 @@ class _Links:
         self._masks = masks
 
     @property
-    def may_join(self) -> bool:
-        """False if the UAVs are in several parts at the start, so that no exchange joins them."""
-        return _parts([sum(1 << other for other in near) for near in self._near]) <= 1
+    def parts_at_start(self) -> int:
+        return _parts([sum(1 << other for other in near) for near in self._near])
 
     def parts(self) -> int:
         """The number of parts into which the UAVs fall that are joined by links that last."""

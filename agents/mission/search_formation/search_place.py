@@ -19,8 +19,8 @@ from fanet_mw.wire.search_plan import Search
 _FREE_REACH: Final = 0.84
 """A follower stays within this share of the radio's reach from its team."""
 _ASIDE_M: Final = 70.0
-"""A UAV of a team examines a survivor at most so far to the side from where `_LEASH_M` lets it fly; less far if its
-camera shows less.
+"""A UAV of a team examines a survivor who is at most so far beside the strip of `_LEASH_M` in which it may fly, or as
+far as its camera shows if that is less.
 """
 _LOOK_SHARE: Final = 0.9
 """The share of its view to the side that a UAV relies on."""
@@ -75,8 +75,8 @@ class SearchPlace:
         self._parted: Collection[int] = ()
         """The UAVs of another part of the swarm, out of reach and not lost."""
         self.sought: Collection[int] = ()
-        """The same; while ranks are closed also the latest ones, if none is out of reach now, because parts that meet
-        by a chance link may lose each other again.
+        """The same. While ranks are closed, those that were in another part last are kept: parts that meet by a chance
+        link may lose each other again.
         """
         self._seen: dict[int, tuple[Enu, int]] = {}
         """Where each other UAV was, by its latest hello or status, and when."""

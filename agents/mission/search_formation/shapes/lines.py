@@ -50,8 +50,10 @@ _STRAIGHT_M: Final = 300.0
 _SIDE_M: Final = 65.0
 """The greatest distance of the outermost lanes from the edge, at most a quarter of the area's side."""
 _SHOWN_M: Final = 45.0
-"""The outermost lanes are this far from the edge if that takes no further lane: from there cameras show the edge.
-Those of lines that begin around the swarm begin this far from the middle: cameras show what is between both lines."""
+"""The outermost lanes are this far from the edge if that takes no further lane: from there cameras show the edge."""
+_ENDS_M: Final = 60.0
+"""The outermost lanes of lines that begin around the swarm begin at most this far from the middle: cameras show what is
+between both lines there, where nobody else comes by."""
 _LEAST_LANES: Final = 2
 """The least number of lanes of a line, which has one at each end."""
 _LEAST_APART_M: Final = 60.0
@@ -281,7 +283,7 @@ class Lines(Shape):
     def _starts_m(self, straight: float) -> float:
         """How far from the middle a lane begins, by how straight the line is there (`_straight`)."""
         first_m = self._formation.first_m
-        ends_m = min(first_m, _SHOWN_M)
+        ends_m = min(first_m, _ENDS_M)
         return ends_m + straight * (first_m - ends_m)
 
     def _straight(self, lane: float) -> float:

@@ -170,7 +170,7 @@ def test_a_uav_that_one_byte_cannot_name_gets_no_place() -> None:
     assert not planner.review(of_few(6, DEMANDS._replace(area_m=400)), now_ns=60 * S), "nor a vacant one later"
 
 
-@pytest.mark.parametrize(("apart_m", "waits_s"), [(200.0, 0.0), (190.0, 7.0)])
+@pytest.mark.parametrize(("apart_m", "waits_s"), [(200.0, 0.0), (190.0, 5.1)])
 def test_lines_around_a_swarm_begin_when_each_is_there_and_could_have_visited_who_is_near_it(
     apart_m: float, waits_s: float
 ) -> None:

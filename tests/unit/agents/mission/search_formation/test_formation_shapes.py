@@ -362,7 +362,7 @@ def test_the_outermost_lanes_fly_to_the_sides_while_the_middle_sweeps_and_waits_
         for axis in ("east", "north")
     )
     assert [east for _, east in east_m] == pytest.approx([1184.375, 1205, 1205, 1205])
-    assert [north for _, north in north_m] == pytest.approx([45, 45, 45 + 9 * (125 - aside_s), 1225], abs=1)
+    assert [north for _, north in north_m] == pytest.approx([60, 60, 60 + 9 * (125 - aside_s), 1225], abs=1)
     assert [north for north, _ in north_m] == pytest.approx([520, 520 + 7.5 * aside_s, 1225, 1225], abs=1)
 
 

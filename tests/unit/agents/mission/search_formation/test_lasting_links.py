@@ -96,7 +96,19 @@ def test_whom_links_do_not_join_at_the_start_nothing_is_tried_for() -> None:
     chosen, is_one = keep_together(
         starts, goals, lambda *_: 0.0, reach_m=REACH_M, random=lambda: drawn.append(None) or 0.5
     )
-    assert (chosen, is_one, drawn) == (list(range(40)), False, [])
+    assert (chosen, is_one) == (list(range(40)), True)
+    assert not drawn
+
+
+def test_who_is_joined_with_nobody_at_the_start_does_not_stop_the_others_from_staying_together() -> None:
+    pattern = fitted(45, Demands(2500, 131, REACH_M, 65, 7.5))
+    assert pattern is not None
+    begun = pattern.begun_around(GRID)[0]
+    goals = [begun.at(place, 0.0) for place in range(45)]
+    starts = [*GRID[:-1], Enu(3000, 3000, 65)]
+    chosen, is_one = keep_together(starts, goals, lambda *_: 0.0, reach_m=REACH_M, random=Random(1).random)
+    assert is_one
+    assert not torn(starts[:-1], goals, chosen[:-1])
 
 
 def test_where_no_link_can_last_everybody_has_the_shortest_way() -> None:

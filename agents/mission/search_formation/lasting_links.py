@@ -38,8 +38,8 @@ def keep_together(
     random: Callable[[], float],
 ) -> tuple[list[int], bool]:
     """The goal of each UAV (there are at least as many goals as UAVs), and whether links that last join all UAVs that
-    are joined at the start; if not, the goals are those of the least sum. `dearer_m2`: the extra cost of a UAV at a goal [m2], added to its squared
-    way there.
+    are joined at the start; if not, the goals are those of the least sum. `dearer_m2`: the extra cost of a UAV at a
+    goal [m2], added to its squared way there.
     """
     ways = [[start.horizontal_to(goal) for goal in goals] for start in starts]
     costs = [[way * way + dearer_m2(uav, goal) for goal, way in enumerate(row)] for uav, row in enumerate(ways)]

@@ -263,8 +263,8 @@ class ConnectivityMaintenance:
         return heard[sought] or ways[sought]
 
     def _lasting(self, plan: Search, pattern: Pattern, place: int, now_ns: int) -> dict[NodeId, Motion]:
-        """The neighbors whose places are in reach of this UAV's. Left out are those that a third UAV connects with it by
-        two links that are strong and shorter; a link that is too long now counts, because it is drawn in again.
+        """The neighbors whose places are in reach of this UAV's. Left out are those that a third UAV connects with it
+        by two links that are strong and shorter; a link that is too long now counts, because it is drawn in again.
         """
         swept_s, place_of = self._formation.swept_s(now_ns) or 0.0, {node: at for at, node in enumerate(plan.nodes)}
         present = {node: motion for node, motion in self._present(now_ns).items() if node in place_of}

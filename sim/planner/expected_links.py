@@ -11,6 +11,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Final
 
 from fanet_mw.airtime import OVERHEAD_BYTES, Timing
+from fanet_mw.graph.topology import within_range
 from fanet_mw.rng import stream, stream_seed
 from fanet_mw.routing.clustered.links.link_quality import STEADY
 from fanet_mw.scenario import Scenario
@@ -40,12 +41,13 @@ def expected_links(scenario: Scenario, at: Mapping[NodeId, Enu], *, draw: int) -
     pairs = np.argwhere(np.triu(np.ones((len(nodes), len(nodes)), dtype=bool), 1)).astype(np.int64)
     ends = places[pairs[:, 0]], places[pairs[:, 1]]
     distance = np.linalg.norm(ends[0] - ends[1], axis=1)
-    mean_dbm = received_dbm(distance, *ends, radio)
+    gains_dbi = np.array([_gain_dbi(scenario, nodes[a], nodes[b]) for a, b in pairs.tolist()])
+    mean_dbm = received_dbm(distance, *ends, radio) + gains_dbi
     if radio.shadowing_db:
         field = Shadowing(radio, seed=stream_seed(draw, "plan"))
         mean_dbm = mean_dbm - field.loss_db(places, pairs, distance)
     if radio.channel == "range":
-        success = (distance <= radio.range_m).astype(np.float64)
+        success = (distance <= radio.range_m * np.power(10.0, gains_dbi / 20)).astype(np.float64)
     else:
         power_dbm = mean_dbm[:, None] + 10 * np.log10(np.array(_gains(radio)))[None, :]
         snr_db = power_dbm - 10 * math.log10(noise_mw(radio))
@@ -94,7 +96,7 @@ def chance_of(scenario: Scenario, at: Mapping[NodeId, Enu]) -> Chance | None:
     if radio.fading != "none" or radio.shadowing_db > 0 or scenario.world.has_obstacles:
         return None
     if radio.channel == "range":
-        return _by_range(at, radio.range_m)
+        return _by_range(scenario, at)
     return _by_error_rate(scenario, at)
 
 
@@ -112,7 +114,7 @@ def _by_error_rate(scenario: Scenario, at: Mapping[NodeId, Enu]) -> Chance:
     def power_dbm(sender: NodeId, receiver: NodeId) -> float:
         from_m, to_m = (np.array([tuple(at[node])]) for node in (sender, receiver))
         distance = np.array([at[sender].minus(at[receiver]).norm()])
-        return float(received_dbm(distance, from_m, to_m, radio)[0])
+        return float(received_dbm(distance, from_m, to_m, radio)[0]) + _gain_dbi(scenario, sender, receiver)
 
     @cache
     def chance(sender: NodeId, receiver: NodeId, others: tuple[NodeId, ...]) -> float:
@@ -127,15 +129,21 @@ def _by_error_rate(scenario: Scenario, at: Mapping[NodeId, Enu]) -> Chance:
     return chance
 
 
-def _by_range(at: Mapping[NodeId, Enu], range_m: float) -> Chance:
+def _by_range(scenario: Scenario, at: Mapping[NodeId, Enu]) -> Chance:
     """1 if exactly one sender is within range of the receiver, which does not send itself."""
+    heard = within_range(at, range_m=scenario.radio.range_m, reaches=scenario.reaches)
 
     @cache
     def near(receiver: NodeId) -> frozenset[NodeId]:
-        return frozenset(node for node, place in at.items() if at[receiver].minus(place).norm() <= range_m)
+        return frozenset((receiver, *heard[receiver]))
 
     def chance(sender: NodeId, receiver: NodeId, others: tuple[NodeId, ...]) -> float:
         senders = (sender, *others)
         return float(receiver not in senders and sum(map(near(receiver).__contains__, senders)) == 1)
 
     return chance
+
+
+def _gain_dbi(scenario: Scenario, *ends: NodeId) -> float:
+    """By how much a link between these nodes is stronger because of the post's antenna."""
+    return scenario.ground.gain_dbi if scenario.post in ends else 0.0

@@ -15,7 +15,7 @@ def show(summary: Mapping[str, Any], console: Console) -> None:
     mode += clock_sentence(summary)
     pace = summary["simulated_s"] / summary["wall_s"] if summary["wall_s"] else 0.0
     length = f"{summary['duration_s']:g} s"
-    if summary["simulated_s"] < summary["duration_s"]:
+    if summary["simulated_s"] < round(summary["duration_s"], 3):
         length = f"partial, {summary['simulated_s']:g} of {length}"
     heading = Text.assemble(
         ("\n" + summary["scenario"], "bold"),

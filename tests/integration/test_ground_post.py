@@ -8,6 +8,8 @@ from kit import slow
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Confirmed, KnownOnGround, MissionModeChanged, Planned, Posed
 from fanet_mw.units import S
+from sim.planner.answer import judge
+from sim.results.files import finish
 from sim.results.packets import packets_of
 from sim.run.virtual import simulate
 
@@ -37,6 +39,23 @@ def test_within_reach_the_post_knows_of_a_find_at_once_and_gets_all_load(
     plans = [r for r in outcome.records if isinstance(r, Planned)]
     assert all(r.node != POST for r in outcome.records if isinstance(r, MissionModeChanged | Posed))
     assert {r.place for r in plans if r.t_ns < 10 * S} == {0, 1, 2, 3}, "it takes no place in the formation"
+
+
+def test_bounds_of_a_timetable_hold_beside_a_post_whose_antenna_is_heard_twice_as_far_and_its_plan_is_feasible(
+    make_scenario: Callable[..., Scenario],
+) -> None:
+    scenario = make_scenario(**{
+        "nodes.count": 8, "nodes.spacing_m": 150, "nodes.columns": 4, "ground.at_m": (-420.0, 0.0),
+        "ground.gain_dbi": 6.0, "traffic.interval_s": 1.5, "traffic.payload_bytes": 400, "clusters.count": 3,
+        "clusters.flooding_period_s": 1, "clusters.relay": "scheduled", "clusters.turn_slack_us": 400,
+        "duration_s": 40, "warmup_s": 15, "drain_s": 3,
+    })  # fmt: skip
+    _, plan, feasible = judge(scenario, change=False)
+    assert feasible, plan["problems"]
+    summary = finish(simulate(scenario), out=None)
+    assert summary["bound"]["violations"] == 0
+    assert summary["bound"]["stated_share"] > 0.8
+    assert summary["pdr"] == 1
 
 
 @pytest.mark.slow

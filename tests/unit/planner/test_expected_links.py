@@ -34,3 +34,23 @@ def test_a_frame_is_lost_as_often_as_by_the_error_table_of_the_emulator(model: s
             assert np.abs(by_sinr - share).min() < 1e-9, distance_m
             assert len(expected_links(scenario, at, draw=0)) == 1
     assert partial > 3
+
+
+@pytest.mark.parametrize("channel", ["range", "log_distance"])
+def test_the_gain_of_the_posts_antenna_makes_its_links_longer_both_ways_and_no_other(channel: str) -> None:
+    keys = ("nodes.count=3", "clusters.count=2", "traffic.sources=2", "ground.at_m=[0,0]", f"radio.channel={channel}")
+    post, far_m = NodeId(4), 270
+    at = {ONE: Enu(0, 0, 50), TWO: Enu(far_m, 0, 50), NodeId(3): Enu(0, 9000, 50), post: Enu(-far_m, 0, 50)}
+
+    def linked(*more: str) -> tuple[set[tuple[int, int]], list[bool]]:
+        scenario = catalog.find("clusters", [*keys, *more])
+        chance = chance_of(scenario, at)
+        assert chance is not None
+        pairs = (ONE, post), (post, ONE), (ONE, TWO)
+        return {(link.a, link.b) for link in expected_links(scenario, at, draw=0)}, [
+            chance(a, b, ()) > 0.5 for a, b in pairs
+        ]
+
+    power = ("radio.tx_power_dbm=25",)
+    assert linked(*power) == (set(), [False] * 3)
+    assert linked(*power, "ground.gain_dbi=6") == ({(ONE, post)}, [True, True, False])

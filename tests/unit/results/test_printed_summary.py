@@ -152,6 +152,7 @@ def test_of_a_run_in_which_nothing_happened_four_rows_are_printed(make_scenario:
     [
         ([], {"wall_s": 0.0}, ["partial, 23 of 24 s in 0.0 s (0.0 x real time)"]),
         ([], {"simulated_s": 24.0}, ["(at least 0.4): 24 s in 2.0 s"]),
+        ([], {"simulated_s": 24.123, "duration_s": 24.1234567}, ["(at least 0.4): 24.1235 s in 2.0 s"]),
         ([], {"paces": [{"time_scale": 0.8, "wall_s": 25}], "disturbance": {}}, ["swarm clock at 0.8: partial"]),
         ([], {"paces": [{"time_scale": 1, "wall_s": 25}], "disturbance": {}}, ["seed 22, real processes: partial"]),
         ([], {"mode": "virtual"}, ["seed 22, virtual time, swarm"]),

@@ -9,7 +9,7 @@ are represented as the bits of integers, by the nodes' row numbers.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Final, NamedTuple, Protocol, TypeVar
 
@@ -37,6 +37,10 @@ class Geometry(NamedTuple):
     margin_m: float = 0.0
     """By so much shorter links are preferred, because positions have errors; the others are used where nodes would be
     cut off without them."""
+    links_by: tuple[tuple[NodeId, float], ...] = ()
+    """How many times as far as others nodes receive, and are received, that have an antenna of their own."""
+    interference_by: tuple[tuple[NodeId, float], ...] = ()
+    """The same of how far they disturb, and are disturbed."""
 
 
 class NodeRows:
@@ -122,15 +126,19 @@ class InterferenceByDistance:
         self.nodes = NodeRows(node for node, _ in positions)
         self._parts: dict[int, tuple[int, int]] = {}
         at = tuple(place for _, place in positions)
-        self.hears = _within(at, geometry.link_m)
-        sure = _within(at, geometry.link_m - geometry.margin_m)
+        far = self._factors(geometry.links_by)
+        self.hears = _within(at, geometry.link_m, far)
+        sure = _within(at, geometry.link_m, far, geometry.margin_m)
         parts = ([reach(links, row)[0] for row in range(len(at))] for links in (sure, self.hears))
         self.sure = not geometry.margin_m or next(parts) == next(parts)
         """True if the links that are farther than errors of positions from the end of the range connect as many."""
         if self.sure:
             self.hears = sure
         disturbed_m = max(geometry.interference_m, geometry.link_m)
-        self.disturbs = _within(at, disturbed_m)
+        self.disturbs = _within(at, disturbed_m, self._factors(geometry.interference_by))
+
+    def _factors(self, by: Sequence[tuple[NodeId, float]]) -> tuple[tuple[int, float], ...]:
+        return tuple((self.nodes.row[node], times) for node, times in by if node in self.nodes.row)
 
     def part(self, root: int) -> tuple[int, int]:
         """The rows that a flood from this row can reach, itself included, and the number of hops to the farthest."""
@@ -184,7 +192,9 @@ class InterferenceByPower:
             if link.chance >= chance:
                 a, b = row[link.a], row[link.b]
                 self.dose[a, b] = self.dose[b, a] = max(1, link.grade)
-        self._disturbing = self._who_disturbs([place for _, place in positions], geometry.interference_m, margin_db)
+        far = {row[node]: times for node, times in geometry.interference_by if node in row}
+        at = [place for _, place in positions]
+        self._disturbing = self._who_disturbs(at, geometry.interference_m, margin_db, far)
 
     def _links(self, known: Sequence[Link], *, least: float) -> list[int]:
         row, found = self.nodes.row, [0] * len(self.nodes.ids)
@@ -204,10 +214,16 @@ class InterferenceByPower:
                 return hears, least
         raise AssertionError("the last choice is the whole")
 
-    def _who_disturbs(self, at: Sequence[Enu], interference_m: float, margin_db: float) -> dict[tuple[int, int], int]:
-        """The rows whose frames disturb each link."""
+    def _who_disturbs(
+        self, at: Sequence[Enu], interference_m: float, margin_db: float, far: Mapping[int, float]
+    ) -> dict[tuple[int, int], int]:
+        """The rows whose frames disturb each link; `far`: those that disturb, and are disturbed, so much farther."""
         weakest = min((dbm for dbm in self._dbm.values()), default=0)
-        apart = [[here.minus(there).norm() for there in at] for here in at]
+        times = [far.get(row, 1.0) for row in range(len(at))]
+        apart = [
+            [here.minus(there).norm() / max(times[row], times[other]) for other, there in enumerate(at)]
+            for row, here in enumerate(at)
+        ]
         found = {}
         for sender, receiver in self.dose:
             dbm = self._dbm[sender, receiver]
@@ -230,9 +246,19 @@ class InterferenceByPower:
 
 
 @lru_cache(maxsize=8)
-def _within(at: tuple[Enu, ...], reach_m: float) -> tuple[int, ...]:
-    """For each place, the others within reach. Many timetables are tried for the same places."""
+def _within(
+    at: tuple[Enu, ...], reach_m: float, far: tuple[tuple[int, float], ...] = (), margin_m: float = 0.0
+) -> tuple[int, ...]:
+    """For each place, the others within reach, less a margin; `far`: rows that reach so many times as far. Many
+    timetables are tried for the same places.
+    """
+    times = dict(far)
     return tuple(
-        sum(1 << other for other, there in enumerate(at) if other != row and math.dist(here, there) <= reach_m)
+        sum(
+            1 << other
+            for other, there in enumerate(at)
+            if other != row
+            and math.dist(here, there) <= reach_m * max(times.get(row, 1.0), times.get(other, 1.0)) - margin_m
+        )
         for row, here in enumerate(at)
     )

@@ -85,6 +85,7 @@ def superframe(scenario: Scenario, *, origin_ns: int = 0, period_ns: int | None 
 def links(scenario: Scenario, turns: Turns) -> Geometry:
     clusters, radio = scenario.clusters, scenario.radio
     wait_ns = radio.lead_ns + radio.handover_ns
+    by = tuple(sorted(scenario.reaches.items()))
     return Geometry(
         link_m=clusters.link_m or radio.range_m,
         interference_m=clusters.interference_m
@@ -92,6 +93,8 @@ def links(scenario: Scenario, turns: Turns) -> Geometry:
         margin_m=0.0 if clusters.link_m else _UNSURE * radio.range_m,
         turns=turns.per_superframe,
         hop_turns=1 + -(-wait_ns // turns.turn_ns),
+        links_by=by if radio.channel == "range" else (),  # on others links grow less with a gain than in free space
+        interference_by=by,
     )
 
 

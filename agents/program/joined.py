@@ -177,5 +177,7 @@ async def join(
         raise ConfigError(f"node = {node}: must be in [1, {known.last_id}]")
     mailbox = Mailbox(messages)
     how = Emulated() if radio is None else radio
+    if isinstance(how, type) or not hasattr(how, "attach"):
+        raise ConfigError(f"radio = {how!r}: must be Emulated(endpoint), OnAir(...) or a VirtualSwarm")
     async with how.attach(known, NodeId(node), [mailbox, *applications]) as drive:
         yield Node(known, NodeId(node), drive, mailbox)

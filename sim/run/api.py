@@ -4,8 +4,10 @@ import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Collection, Sequence
 from pathlib import Path
+from typing import Final
 
 from agents.program.attached import Emulated
+from fanet_mw.errors import BusError
 from fanet_mw.scenario import Scenario
 from sim.results.outcome import Outcome
 from sim.results.result import Result
@@ -14,6 +16,10 @@ from sim.run.launcher.leads import fitted
 from sim.run.launcher.swarm import READY_TIMEOUT_S, SwarmRun
 from sim.run.launcher.swarm import launch as launch_processes
 from sim.run.virtual import simulate as run_virtual
+
+
+_LAST_WORD_S: Final = 5.0
+"""The time in which a launcher whose router has gone says what has ended it."""
 
 
 def simulate(
@@ -35,7 +41,7 @@ class Launched:
         self.scenario = scenario
         """The scenario that is run."""
         self.processes = swarm.processes
-        """Its processes, by name."""
+        """Its processes: `processes.names()`, and `processes.pid(name)` of each."""
         self.radio = Emulated(endpoint=swarm.address.endpoint, swarm=swarm.address.swarm, patience_s=READY_TIMEOUT_S)
         """The radio by which a node that was left out joins: `join(swarm.scenario, node=3, radio=swarm.radio)`."""
         self.result: Result | None = None
@@ -90,6 +96,11 @@ async def launch(
         if not task.done():
             launched.stop()
         launched.result = Result(await task)
+    except BusError as error:
+        await asyncio.wait((task,), timeout=_LAST_WORD_S)  # a node of the block has lost its router: why is said there
+        if task.done() and not task.cancelled() and (why := task.exception()) is not None:
+            raise why from error
+        raise
     finally:
         task.cancel()
         with contextlib.suppress(asyncio.CancelledError, Exception):

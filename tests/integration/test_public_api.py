@@ -300,6 +300,13 @@ def test_another_seed_is_that_of_the_scenario_built_or_named() -> None:
         fanet_mw.simulate(built, seed=-1)
 
 
+@pytest.mark.parametrize("radio", ["tcp/127.0.0.1:7447", fanet_mw.Emulated])
+async def test_what_is_no_radio_is_said_with_its_value(radio: Any) -> None:
+    with pytest.raises(fanet_mw.ConfigError, match=r"radio = .*: must be Emulated\(endpoint\), OnAir"):
+        async with fanet_mw.join("quick", node=1, radio=radio):
+            pass
+
+
 async def test_a_node_that_there_is_not_cannot_be_left_out() -> None:
     with pytest.raises(fanet_mw.ConfigError, match=r"leave_out: node 77 must be in \[1, nodes.count = 9\]"):
         async with fanet_mw.launch("quick", leave_out=[77]):

@@ -107,6 +107,19 @@ async def test_a_program_that_waits_for_the_end_of_its_swarm_has_a_whole_result(
     assert swarm.result.summary["aborted"] is None
 
 
+@pytest.mark.parametrize("left_out", [(), (1, 2)])
+async def test_a_node_that_is_there_twice_ends_a_program_that_launches_and_is_named(left_out: tuple[int, ...]) -> None:
+    """It waited for five minutes, and said that the router was gone."""
+
+    async def join(swarm: fanet_mw.Launched) -> None:
+        async with fanet_mw.join(swarm.scenario, node=1, radio=swarm.radio):
+            pass
+
+    with pytest.raises(fanet_mw.BusError, match=r"there twice: agent-1.*leave_out"):
+        async with asyncio.timeout(30), fanet_mw.launch("quick", leave_out=left_out) as swarm:
+            await asyncio.gather(join(swarm), join(swarm))
+
+
 async def test_a_program_that_leaves_before_its_swarm_is_up_is_told_why_there_is_no_result() -> None:
     with pytest.raises(fanet_mw.BusError, match="before the swarm's time began: there is no result"):
         async with fanet_mw.launch("flooding", overrides=["nodes.count=2", *ONE]):

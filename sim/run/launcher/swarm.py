@@ -132,6 +132,7 @@ class SwarmRun:
         slow_down_to: float | None = None,
         leads: Leads | None = None,
         awaited: Callable[[], Sequence[str]] = tuple,
+        patient: bool = True,
     ) -> None:
         scenario, self.address = services.scenario, services.address
         names = Topics(self.address.swarm)
@@ -140,6 +141,8 @@ class SwarmRun:
         self._awaited = awaited
         """Names the programs beside the swarm that are not ready yet, for which the clock waits."""
         self._tell = tell
+        self._patient = patient
+        """False: nobody is there who could end the one of two programs that are the same node."""
         self._collector = Collector(scenario, bus.subscribe, names, now_ns=time.monotonic_ns, folder=spool_folder)
         bus.answer(names.standing, self._collector.standing)
         self._recorder = FlightRecorder(scenario, bus.subscribe, names) if respawn else None
@@ -266,6 +269,8 @@ class SwarmRun:
                 self._tell(f"waiting for {', '.join(self._awaited())}")
             else:
                 self._tell(f"waiting for {len(presence.missing())} of {len(expected)}: {presence.sentence()}")
+            if not self._patient and presence.twice():
+                self.abort(f"{presence.sentence()}; leave_out names the nodes that a program joins, each once")
         over.cancel()
         if not start.done():
             start.cancel()
@@ -506,7 +511,7 @@ async def launch(
         services = Services(scenario, address, own_world, frozenset(leave_out), emulator_options or {})
         run = SwarmRun(
             services, bus, respawn=respawn, tell=on_event, spool_folder=spool_folder, slow_down_to=slow_down_to,
-            leads=leads, awaited=awaited,
+            leads=leads, awaited=awaited, patient=heed_signals,
         )  # fmt: skip
         with heeding(run.interrupt) if heed_signals else contextlib.nullcontext():
             return await run.run(on_progress, on_started)

@@ -17,7 +17,6 @@ from sim.run.launcher.swarm import READY_TIMEOUT_S, SwarmRun
 from sim.run.launcher.swarm import launch as launch_processes
 from sim.run.virtual import simulate as run_virtual
 
-
 _LAST_WORD_S: Final = 5.0
 """The time in which a launcher whose router has gone says what has ended it."""
 

@@ -5,12 +5,13 @@ from collections.abc import Callable
 import pytest
 
 from fanet_mw.routing.clustered.tdma.turn_timing import Turns, turn_ns, turn_slack_ns
+from fanet_mw.routing.clustered.timetable.interference import InterferenceByDistance
 from fanet_mw.routing.clustered.timetable.node_timetable import FittedTimetable, NodeTimetable
 from fanet_mw.routing.clustered.timetable.timetable import Timetable, Turn
 from fanet_mw.routing.clustered.timetable.turn_size import links, superframe
 from fanet_mw.scenario import Scenario
 from fanet_mw.timesync.turn_slack import clocks_fit
-from fanet_mw.units import MS, US, NodeId
+from fanet_mw.units import MS, US, Enu, NodeId
 
 MakeScenario = Callable[..., Scenario]
 KEYS = {"clusters.relay": "scheduled", "nodes.count": 5}
@@ -59,6 +60,20 @@ def test_with_a_range_interference_reaches_that_far_and_by_errors_of_gps_farther
     scenario = make_scenario(**KEYS, **errors)
     margin = links(scenario, superframe(scenario)).interference_m - scenario.radio.range_m
     assert margin == pytest.approx(margin_m)
+
+
+@pytest.mark.parametrize(("channel", "heard"), [("range", 0b110), ("log_distance", 0)])
+def test_the_post_disturbs_as_much_farther_as_its_antenna_reaches_and_with_a_range_is_heard_so_far(
+    make_scenario: MakeScenario, channel: str, heard: int
+) -> None:
+    keys = {"nodes.count": 2, "ground.at_m": [0, 0], "ground.gain_dbi": 12.1, "radio.channel": channel}
+    scenario = make_scenario(**keys)  # as far as four times the range
+    swarm = InterferenceByDistance(
+        ((NodeId(1), Enu(-900, 0, 0)), (NodeId(2), Enu(900, 0, 0)), (NodeId(3), Enu(0, 0, 0))),
+        links(scenario, superframe(scenario))._replace(interference_m=255.0),
+    )
+    assert swarm.disturbs == (0b100, 0b100, 0b011)
+    assert swarm.hears[0] == swarm.hears[1] == heard & 0b100
 
 
 def test_a_hop_takes_the_turns_of_lead_and_handover(make_scenario: MakeScenario) -> None:

@@ -12,6 +12,7 @@ from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason
 from fanet_mw.node.contract import Port, RoutingProtocol
 from fanet_mw.node.packet import Packet, Relay, is_used_up
+from fanet_mw.routing.event_jitter import EventJitter
 from fanet_mw.units import BROADCAST
 from fanet_mw.wire import FLAG_FLOOD
 
@@ -26,9 +27,10 @@ class FloodingProtocol(RoutingProtocol):
         super().__init__(port)
         self._lead_ns = port.scenario.radio.lead_ns
         self._random = port.stream(self.stream_name).random
+        self._event_jitter = EventJitter(port)
 
     def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
-        self._port.transmit(packet.frame, BROADCAST, start_ns=due_ns)
+        self._port.transmit(packet.frame, BROADCAST, start_ns=self._event_jitter.start_ns(packet, due_ns))
 
     def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> Sequence[Relay]:
         header = packet.header

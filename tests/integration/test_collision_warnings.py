@@ -3,6 +3,7 @@
 from typing import Any
 
 import pytest
+from kit import slow
 
 from fanet_mw import mavlink
 from fanet_mw.errors import ConfigError
@@ -47,6 +48,13 @@ def test_two_that_meet_head_on_hit_without_warnings_and_pass_clear_with_them() -
     assert warned["warnings"]["pdr"] == warned["separation"]["reached_the_other"] == 1
     heard = [m for _, data in outcome.taps for m in mavlink.decode(data) if m.get_type() == "COLLISION"]
     assert len(heard) == len(said)
+
+
+@pytest.mark.parametrize("protocol", ["flooding", *slow("aodv", "direct", "gossip", "counter")])
+def test_two_that_foresee_the_same_at_the_same_fix_of_gps_do_not_warn_at_the_same_instant(protocol: str) -> None:
+    _, summary = flown(PAIR, f"routing.protocol={protocol}", "traffic.arrivals=none")
+    assert summary["separation"]["warnings"] > 2
+    assert summary["warnings"]["pdr"] == 1
 
 
 @pytest.mark.slow

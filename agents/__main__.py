@@ -16,7 +16,7 @@ from agents.uav import Uav
 from fanet_mw.autopilot.link import AutopilotLink
 from fanet_mw.autopilot.serving import Autopilot, AutopilotBus
 from fanet_mw.bus.topics import Topics
-from fanet_mw.errors import ConfigError, FanetError
+from fanet_mw.errors import ConfigError, FanetError, LocalProtocolError
 from fanet_mw.flavors import Flavor
 from fanet_mw.gateway.connections import Address, address_of
 from fanet_mw.geodesy import Geodetic
@@ -211,6 +211,8 @@ def main() -> int:
             autopilot=given.autopilot,
             flavor=given.flavor,
         )
+    except LocalProtocolError:
+        raise  # a bug, perhaps of a part of another package: where it is says the traceback
     except FanetError as error:
         _tell(str(error))
         return 2 if isinstance(error, ConfigError) else service.BUS_EXIT_CODE

@@ -29,3 +29,30 @@ def test_every_process_of_a_swarm_finds_the_parts(tmp_path: Path) -> None:
     assert summary["mode"] == "realtime"
     assert summary["generated"] >= 6
     assert summary["pdr"] > 0.5
+
+
+def test_a_mistake_of_a_part_is_shown_with_its_place_and_is_no_loss_of_the_bus(tmp_path: Path) -> None:
+    (tmp_path / "mistaken.py").write_text(
+        "from fanet_mw import Application, Data\n"
+        "class Far(Application):\n"
+        "    def __init__(self, scenario, node, options): pass\n"
+        "    def next_wake_ns(self): return 500_000_000\n"
+        "    def wake(self, now_ns): self.port.send(Data(7, b''), destination=99)\n"
+    )
+    changes = [
+        "nodes.count=2",
+        "traffic.sources=1",
+        "duration_s=2",
+        "warmup_s=0",
+        "drain_s=1",
+        "applications=[{use='mistaken:Far',nodes=[2]}]",
+    ]
+    ended = subprocess.run(
+        [sys.executable, "-m", "fanet_mw", "launch", "flooding", "--set", *changes, "--json"], cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join((str(tmp_path), str(ROOT)))},
+        capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
+    assert ended.returncode == 1
+    assert 'mistaken.py", line 5, in wake' in ended.stderr
+    assert "LocalProtocolError: destination = 99 must be" in ended.stderr
+    assert json.loads(ended.stdout)["processes"]["ended"] == [{"name": "agent-2", "exit_code": 1}]

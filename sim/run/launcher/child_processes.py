@@ -21,7 +21,7 @@ from multiprocessing.context import ForkServerContext, ForkServerProcess
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from fanet_mw.errors import ConfigError, FanetError, HostError
+from fanet_mw.errors import ConfigError, FanetError, HostError, LocalProtocolError
 from fanet_mw.hosts.service import BUS_EXIT_CODE
 from sim.results.outcome import described
 from sim.run.launcher import process_setup
@@ -84,6 +84,8 @@ def _child(recipe: ChildRecipe) -> None:
         if recipe.gives_way:
             _give_way()
         code = recipe.entry(**recipe.arguments)
+    except LocalProtocolError:
+        raise  # a bug, perhaps of a part of another package: where it is says the traceback
     except FanetError as error:
         sys.stderr.write(f"{error}\n")
         code = _REFUSED if isinstance(error, ConfigError) else BUS_EXIT_CODE

@@ -20,6 +20,7 @@ from fanet_mw.node.header_check import CONTROL, RESTART_STEP_NS
 from fanet_mw.node.node import Node
 from fanet_mw.node.packet import Packet
 from fanet_mw.node.packet_watch import PacketNews, RadioStage
+from fanet_mw.part_failure import is_ours
 from fanet_mw.rng import stream
 from fanet_mw.units import BROADCAST, MS, US, NodeId, S, seconds_to_ns
 from fanet_mw.wire import PRIORITY_BULK
@@ -239,11 +240,12 @@ class Messenger:
     ) -> int:
         if not application.follows:
             return self._node.send(
-                frames, destination=to, priority=priority, app=application.name, born_ns=born_ns, now_ns=now_ns
-            )
+                frames, destination=to, priority=priority, app=application.name, born_ns=born_ns, now_ns=now_ns,
+                jitter=not is_ours(application),
+            )  # fmt: skip
         seq = self._node.send(
             frames, destination=to, priority=priority, app=application.name, born_ns=born_ns, now_ns=now_ns,
-            watch=True, watch_radio=_follows_radio(application),
+            watch=True, watch_radio=_follows_radio(application), jitter=not is_ours(application),
         )  # fmt: skip
         self._statuses.tell(application, Status(seq, Fate.ADMITTED, now_ns))
         self._statuses.watch(seq, application, seq, first=True, confirmed=False)
@@ -256,6 +258,7 @@ class Messenger:
         seq = self._node.send(
             packet.inner, destination=packet.destination, priority=packet.priority, app=application.name,
             born_ns=born_ns, now_ns=now_ns, watch=watched, watch_radio=packet.first and _follows_radio(application),
+            jitter=not is_ours(application),
         )  # fmt: skip
         if watched:
             self._statuses.watch(seq, application, packet.number, first=packet.first, confirmed=confirmed)

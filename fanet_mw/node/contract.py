@@ -89,6 +89,8 @@ class RoutingProtocol(ABC):
 
     origin_flags: ClassVar[int] = 0
     """The flags of the application packets that this node originates."""
+    contends_at_once: ClassVar[bool] = False
+    """True if what this node floods contends as soon as it is due; on an event of several nodes that needs jitter."""
 
     def __init__(self, port: Port) -> None:
         self._port = port

@@ -16,6 +16,7 @@ from fanet_mw.bus.messages import Reception, TxStatus
 from fanet_mw.errors import DropReason, LocalProtocolError, MalformedFrameError
 from fanet_mw.node.contract import Port, RoutingProtocol
 from fanet_mw.node.duplicates import DELIVERED, DuplicateSet, key_of
+from fanet_mw.node.event_jitter import EventJitter
 from fanet_mw.node.header_check import HeaderCheck
 from fanet_mw.node.neighbors import Silences
 from fanet_mw.node.packet import Packet, Relay
@@ -26,7 +27,7 @@ from fanet_mw.part_failure import protocol_report_of
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Delivered, Generated, Record
 from fanet_mw.units import BROADCAST, US, Enu, NodeId
-from fanet_mw.wire import Kind
+from fanet_mw.wire import FLAG_FLOOD, PRIORITY_SAFETY, Kind
 
 _DATA: Final = int(Kind.DATA)
 _HELLO: Final = int(Kind.HELLO)
@@ -88,6 +89,7 @@ class Node:
         """The transmissions that the actor is to take to the radio."""
         self.watch = self.port.watch
         """What becomes of the own packets that an application wants to know of."""
+        self._event_jitter = EventJitter(self.port.stream("event_jitter"), most_ns=scenario.routing.jitter_ns)
         protocol = self._protocol = make_protocol(self.port)
         self.next_wake_ns = protocol.next_wake_ns
         """The protocol's own method, because every wake-up is followed by this question."""
@@ -158,11 +160,12 @@ class Node:
         now_ns: int,
         watch: bool = False,
         watch_radio: bool = False,
+        jitter: bool = False,
     ) -> int:
         """Send an application payload (whole MAVLink frames); returns the packet's sequence number. Delay counts from
         `born_ns`, at most `now_ns`; the first frame may go `radio.lead_ms` later. With `watch`, `Node.watch` will tell
-        the packet's fate, with `watch_radio` also when the radio is done. Raises LocalProtocolError beyond
-        `most_packet_bytes`.
+        the packet's fate, with `watch_radio` also when the radio is done; with `jitter`, and every warning, a flood
+        that would contend at once waits a moment. Raises LocalProtocolError beyond `most_packet_bytes`.
         """
         size, most = wire.HEADER_BYTES + len(inner), self.most_packet_bytes(priority)
         if size > most:
@@ -184,7 +187,11 @@ class Node:
         if watch:
             self.watch.begin(seq, radio=watch_radio)
         due_ns = max(born_ns + self.scenario.radio.lead_ns, now_ns)
-        self._protocol.originate(packet, due_ns=due_ns, now_ns=now_ns)
+        protocol = self._protocol
+        floods = destination == BROADCAST or protocol.origin_flags & FLAG_FLOOD
+        if protocol.contends_at_once and floods and (jitter or priority == PRIORITY_SAFETY):
+            due_ns += self._event_jitter.ns(now_ns)
+        protocol.originate(packet, due_ns=due_ns, now_ns=now_ns)
         return seq
 
     def say_hello(self, inner: bytes, *, start_ns: int, now_ns: int, time: bytes | None = None) -> AnnouncedHello:

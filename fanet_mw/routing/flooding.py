@@ -12,7 +12,6 @@ from fanet_mw.bus.messages import Reception
 from fanet_mw.errors import DropReason
 from fanet_mw.node.contract import Port, RoutingProtocol
 from fanet_mw.node.packet import Packet, Relay, is_used_up
-from fanet_mw.routing.event_jitter import EventJitter
 from fanet_mw.units import BROADCAST
 from fanet_mw.wire import FLAG_FLOOD
 
@@ -21,16 +20,16 @@ class FloodingProtocol(RoutingProtocol):
     """Floods everything; a subclass decides about each first copy. The node suppresses duplicates."""
 
     origin_flags: ClassVar[int] = FLAG_FLOOD
+    contends_at_once: ClassVar[bool] = True
     stream_name: ClassVar[str]
 
     def __init__(self, port: Port) -> None:
         super().__init__(port)
         self._lead_ns = port.scenario.radio.lead_ns
         self._random = port.stream(self.stream_name).random
-        self._event_jitter = EventJitter(port)
 
     def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
-        self._port.transmit(packet.frame, BROADCAST, start_ns=self._event_jitter.start_ns(packet, due_ns))
+        self._port.transmit(packet.frame, BROADCAST, start_ns=due_ns)
 
     def receive(self, packet: Packet, reception: Reception, *, now_ns: int) -> Sequence[Relay]:
         header = packet.header

@@ -17,7 +17,6 @@ from fanet_mw.node.contract import Port, RoutingProtocol
 from fanet_mw.node.packet import Packet, is_used_up
 from fanet_mw.routing import rival_control_messages as control
 from fanet_mw.routing.address_resolution import Knowledge, Outgoing, Resolver
-from fanet_mw.routing.event_jitter import EventJitter
 from fanet_mw.routing.rival_control_messages import Family, check_node, type_of, unpack
 from fanet_mw.units import BROADCAST, NodeId, earliest, seconds_to_ns
 from fanet_mw.wire import Kind
@@ -84,6 +83,7 @@ class _SendBuffer:
 class HopByHop(RoutingProtocol):
     """The base of the rival protocols that keep routes."""
 
+    contends_at_once: ClassVar[bool] = True
     family: ClassVar[Family]
 
     def __init__(self, port: Port) -> None:
@@ -91,7 +91,6 @@ class HopByHop(RoutingProtocol):
         self._lead_ns = port.scenario.radio.lead_ns
         self._jitter_ns = port.scenario.routing.jitter_ns
         self._random = port.stream("routing").random
-        self._event_jitter = EventJitter(port)
         self._unicasts: dict[int, tuple[Packet, NodeId]] = {}
         """Data packets handed to the MAC and not yet acknowledged, by request number."""
         self._controls: dict[int, NodeId] = {}
@@ -147,7 +146,7 @@ class HopByHop(RoutingProtocol):
     def originate(self, packet: Packet, *, due_ns: int, now_ns: int) -> None:
         destination = NodeId(packet.header.destination)
         if destination == BROADCAST:
-            self._port.transmit(packet.frame, BROADCAST, start_ns=self._event_jitter.start_ns(packet, due_ns))
+            self._port.transmit(packet.frame, BROADCAST, start_ns=due_ns)
         elif destination != self._port.node:
             self._route_own(packet, start_ns=due_ns, now_ns=now_ns)
 

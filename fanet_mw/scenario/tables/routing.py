@@ -40,8 +40,8 @@ class Routing(Section):
     """`aodv`, `olsr`, `dsdv`, `geographic`: whether a node must ask for a neighbor's address before its first unicast
     to it, as with IP, by the rules of RFC 826 or of ns-3. `none`: the node id is the address."""
     jitter_ms: Milliseconds = 10.0
-    """A relay waits U(0, jitter) after a reception. So does an own warning, which both UAVs of a conflict have at one
-    instant; `clustered` and `rounds` have times of their own for it."""
+    """A relay waits U(0, jitter) after a reception. So do own floods of warnings, and of users' applications, because
+    several nodes may see one event at one instant; `clustered` and `rounds` have times of their own for them."""
     hop_limit: Annotated[int, Field(ge=1, le=255)] = 32
     """The greatest number of hops of a packet."""
     queue_frames: Count = 512

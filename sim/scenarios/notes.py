@@ -7,8 +7,9 @@ import re
 from collections.abc import Iterator
 from typing import Final, get_args
 
+from agents.mission.searcher import formation
 from fanet_mw.errors import ConfigError
-from fanet_mw.graph.topology import within_range
+from fanet_mw.graph.topology import levels, within_range
 from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.tables.faults import AnyFault, BatteryFault, CrashFault, RestoreFault, StopFault
 from fanet_mw.scenario.tables.radio import CHANNELS, Radio
@@ -40,7 +41,7 @@ _SIGMAS: Final = 2.0
 def notes(scenario: Scenario) -> list[str]:
     """All notes on a scenario, one sentence each; empty if there are none."""
     kinds = (
-        _after_the_end, _crossed_faults, _without_effect, _without_place, _still_waves, _beyond_the_vehicle,
+        _after_the_end, _crossed_faults, _without_effect, _without_place, _too_long, _still_waves, _beyond_the_vehicle,
         _close_pads, _low_ceiling, _high_roofs, _empty_batteries, _out_of_reach, _outside_the_area, _odd_band,
         _wide_formation, _keeping_clear_of_nobody, _guessed,
     )  # fmt: skip
@@ -154,6 +155,20 @@ def _without_place(scenario: Scenario) -> Iterator[str]:
             f"nodes.count = {scenario.nodes.count}: the plan of a search has {MOST_PLACES} places; {more} of the UAVs "
             "will get none, wait where they start, and fly to survivors only"
         )
+
+
+def _too_long(scenario: Scenario) -> Iterator[str]:
+    """A formation in which packets have more hops to make than they may."""
+    limit, count = scenario.routing.hop_limit, scenario.nodes.count
+    pattern = None if scenario.mission.search == "none" else formation(scenario, count)
+    if pattern is not None:
+        tied = {place: pattern.tethers(place, 0.0) for place in range(pattern.places)}
+        hops = max(max(levels(tied, place).values()) for place in tied)
+        if hops > limit:
+            yield (
+                f"routing.hop_limit = {limit}: the formation of {count} UAVs is up to {hops} hops long, so packets "
+                "of one end do not reach the other one"
+            )
 
 
 def _still_waves(scenario: Scenario) -> Iterator[str]:

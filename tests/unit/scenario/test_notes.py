@@ -128,6 +128,14 @@ def test_a_swarm_that_hears_nobody_or_starts_outside_its_area_is_noted(changes: 
     assert [note[: len(said or "")] for note in found] == ([said] if said else [])
 
 
+def test_a_formation_that_is_longer_than_packets_may_go_is_noted() -> None:
+    large = ["nodes.count=200", "world.area_m=5000"]
+    (said,) = notes(catalog.find("rescue", large))
+    assert said.startswith("routing.hop_limit = 32: the formation of 200 UAVs is up to 52 hops long")
+    assert not notes(catalog.find("rescue", [*large, "routing.hop_limit=52"]))
+    assert not notes(catalog.find("rescue"))
+
+
 def test_uavs_for_whom_the_plan_has_no_place_are_noted() -> None:
     few = ["world.area_m=1000", "nodes.spacing_m=50"]
     assert notes(catalog.find("rescue", [*few, "nodes.count=200"])) == []

@@ -26,6 +26,8 @@ from typing import Final
 from fanet_mw.errors import ConfigError
 
 ROOT: Final = "fanet"
+ALL_SCENARIOS: Final = f"{ROOT}/*/scenario"
+"""The topics of queries for the scenarios of all swarms of a router."""
 _NAME: Final = re.compile(r"[^\s/*$#?]{1,128}")
 
 
@@ -90,6 +92,11 @@ class Topics:
         """The liveliness token of a process: its name, its scenario, and which of several processes of that name."""
         rest = f"/{fingerprint}/{instance}" if fingerprint else ""
         return f"{self._base}/alive/{name}{rest}"
+
+
+def swarm_of(topic: str) -> str:
+    """The name of the swarm whose topic this is."""
+    return topic.split("/")[1]
 
 
 def node_of(topic: str) -> int:

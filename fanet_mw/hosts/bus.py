@@ -247,11 +247,11 @@ class Bus:
         self._session.declare_queryable(topic, on_query)
 
     def ask(self, topic: str, on_sample: OnSample) -> None:
-        """Query a topic; each answer comes as a sample. On a closed session no query is made."""
+        """Query a topic; each answer comes as a sample, with the topic of who answers. On a closed session no query is made."""
 
         def on_reply(reply: zenoh.Reply) -> None:
             if reply.ok is not None:
-                on_sample(topic, reply.ok.payload.to_bytes())
+                on_sample(str(reply.ok.key_expr), reply.ok.payload.to_bytes())
 
         if not self._session.is_closed():
             self._session.get(topic, on_reply, timeout=_ANSWERED_S, consolidation=zenoh.ConsolidationMode.NONE)

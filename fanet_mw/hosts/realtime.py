@@ -12,6 +12,7 @@ import asyncio
 import gc
 import json
 import secrets
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -19,7 +20,7 @@ from typing import Final, NamedTuple
 from fanet_mw.actor import Actor, require_instant
 from fanet_mw.bus import codecs
 from fanet_mw.bus.messages import Message, Reception, Report, TraceBatch
-from fanet_mw.bus.topics import Topics
+from fanet_mw.bus.topics import ALL_SCENARIOS, Topics, swarm_of
 from fanet_mw.errors import ConfigError
 from fanet_mw.hosts.bus import JOIN_PATIENCE_S, Bus, HostBus, config_of
 from fanet_mw.hosts.clock import START_PATIENCE_S, ClockListener, SwarmClock
@@ -68,6 +69,7 @@ class RealtimeHost:
         self._wake_up: _WakeUp | None = None
         self._call_ns = 0
         self._records: list[Record] = []
+        self._told_other_swarm = False
         self._lateness = WakeLateness()
         self._cost = ProcessCost()
 
@@ -118,12 +120,25 @@ class RealtimeHost:
         self._bus.ask(self._names.scenario, on_answer)
         try:
             theirs = told_by(self._names.swarm, await asyncio.wait_for(answer, _SCENARIO_S))
-        except (TimeoutError, ValueError, RecursionError):
+        except TimeoutError:
+            self._bus.ask(ALL_SCENARIOS, self._tell_other_swarm)
+            return
+        except (ValueError, RecursionError):
             return
         found = list(differences(identity(scenario), theirs))
         if found:
             keys = few(f"{key} = {ours!r} here, {other!r} there" for key, ours, other in found)
             raise ConfigError(f"{self._actor.name} runs another scenario than swarm {self._names.swarm}: {keys}")
+
+    def _tell_other_swarm(self, topic: str, _payload: bytes) -> None:
+        """Called on the bus's thread: the router serves another swarm. It is no error, as ours may come later."""
+        mine, theirs = self._names.swarm, swarm_of(topic)
+        if not self._told_other_swarm and theirs.isprintable():
+            self._told_other_swarm = True
+            sys.stderr.write(
+                f"{self._actor.name} waits for swarm {mine}, which nobody serves there; served is {theirs}. A swarm is "
+                "named as its scenario, unless --swarm says otherwise\n"
+            )
 
     def nudge(self) -> None:
         """Let the actor look now at what was given to it from outside, on this thread; nothing before it runs."""

@@ -107,6 +107,26 @@ async def test_a_program_that_waits_for_the_end_of_its_swarm_has_a_whole_result(
     assert swarm.result.summary["aborted"] is None
 
 
+async def test_who_waits_for_a_swarm_of_another_name_than_the_router_has_is_told_the_name(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """It waited for an hour without a word."""
+    scenario, endpoint = fanet_mw.load_scenario("quick"), free_endpoint()
+    with Bus.serve(endpoint) as bus:
+        ClockKeeper(bus, Topics("mine"), time_scale=1.0, expected=("agent-1", "agent-2"), scenario=scenario)
+        for swarm in ("mine", "quick"):
+            with pytest.raises(TimeoutError):
+                async with (
+                    asyncio.timeout(4),
+                    fanet_mw.join(scenario, node=1, radio=fanet_mw.Emulated(endpoint, swarm=swarm)),
+                ):
+                    pass
+            said = capsys.readouterr().err
+            assert ("agent-1 waits for swarm quick, which nobody serves there; served is mine" in said) == (
+                swarm == "quick"
+            ), said
+
+
 @pytest.mark.parametrize("left_out", [(), (1, 2)])
 async def test_a_node_that_is_there_twice_ends_a_program_that_launches_and_is_named(left_out: tuple[int, ...]) -> None:
     """It waited for five minutes, and said that the router was gone."""

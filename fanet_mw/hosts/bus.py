@@ -247,7 +247,7 @@ class Bus:
         self._session.declare_queryable(topic, on_query)
 
     def ask(self, topic: str, on_sample: OnSample) -> None:
-        """Query a topic; each answer comes as a sample, with the topic of who answers. On a closed session no query is made."""
+        """Query a topic; each answer comes with the topic of who answers. On a closed session no query is made."""
 
         def on_reply(reply: zenoh.Reply) -> None:
             if reply.ok is not None:

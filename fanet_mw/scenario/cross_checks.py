@@ -56,8 +56,9 @@ def disagreements(scenario: Scenario) -> Sequence[str]:
             f"warmup_s + drain_s = {scenario.warmup_s + scenario.drain_s:g} "
             f"must be < duration_s = {scenario.duration_s:g}"
         )
-    for traffic in (scenario.traffic, *scenario.further_traffic):
-        found += _impossible_traffic(scenario, traffic)
+    classes = (scenario.traffic, *scenario.further_traffic)
+    for index, traffic in enumerate(classes):
+        found += _impossible_traffic(scenario, traffic, f"traffic.{index}" if len(classes) > 1 else "traffic")
     names = [*scenario.traffic_classes]
     if len(names) <= len(scenario.further_traffic) or _TAKEN & set(names):
         found.append(f"traffic.name: {', '.join(names)} must be different, and none of {', '.join(sorted(_TAKEN))}")
@@ -152,34 +153,34 @@ def _impossible_rounds(scenario: Scenario) -> Iterator[str]:
         )
 
 
-def _impossible_traffic(scenario: Scenario, traffic: Traffic) -> Iterator[str]:
+def _impossible_traffic(scenario: Scenario, traffic: Traffic, key: str) -> Iterator[str]:
     """Nodes that do not exist, packets that are too long, and classes for which a timetable has no room."""
     count, most = scenario.nodes.count, scenario.radio.max_frame_bytes
     if traffic.destination != "all" and traffic.destination > scenario.node_count:
-        yield f"traffic.destination = {traffic.destination} must be <= {scenario.last_id}"
+        yield f"{key}.destination = {traffic.destination} must be <= {scenario.last_id}"
     if isinstance(traffic.sources, int) and traffic.sources > count:
-        yield f"traffic.sources = {traffic.sources} must be <= nodes.count = {count}"
+        yield f"{key}.sources = {traffic.sources} must be <= nodes.count = {count}"
     elif traffic.sources == count and traffic.destination in scenario.uav_ids:
         yield (
-            f"traffic.sources = {count} must be <= {count - 1}, the nodes that are not traffic.destination = "
+            f"{key}.sources = {count} must be <= {count - 1}, the nodes that are not {key}.destination = "
             f"{traffic.destination}"
         )
-    for key, ids in (("sources", traffic.sources), ("targets", traffic.targets)):
+    for name, ids in (("sources", traffic.sources), ("targets", traffic.targets)):
         if isinstance(ids, tuple) and any(i > scenario.node_count for i in ids):
-            yield f"traffic.{key} = {list(ids)} must be node ids <= {scenario.last_id}"
+            yield f"{key}.{name} = {list(ids)} must be node ids <= {scenario.last_id}"
     if isinstance(traffic.sources, tuple) and traffic.destination in traffic.sources:
         yield (
-            f"traffic.sources = {list(traffic.sources)} must not name traffic.destination = {traffic.destination}: "
+            f"{key}.sources = {list(traffic.sources)} must not name {key}.destination = {traffic.destination}: "
             "no node sends to itself"
         )
     longest = traffic.longest_bytes
     if longest > most:
-        yield f"traffic.payload_bytes = {longest} must be <= radio.max_frame_bytes = {most}"
+        yield f"{key}.payload_bytes = {longest} must be <= radio.max_frame_bytes = {most}"
     if (scenario.routing.protocol, scenario.clusters.relay) == ("clustered", "scheduled"):
         room = scenario.traffic.payload_bytes
         if longest > room or traffic.priority != "bulk":
             yield (
-                f"traffic.payload_bytes = {longest}, priority = {traffic.priority}: a timetable "
+                f"{key}.payload_bytes = {longest}, priority = {traffic.priority}: a timetable "
                 f'(clusters.relay = "scheduled") has room for bulk of the first class, {room} bytes'
             )
 

@@ -85,7 +85,17 @@ def _path(item: dict[str, Any]) -> list[str]:
         return []
     *path, last = map(str, item["loc"])
     kept = item["type"] == "extra_forbidden" or not _is_branch(last)
-    return [*(part for part in path if not _is_branch(part)), *([last] if kept else [])]
+    return _as_in_a_file([*(part for part in path if not _is_branch(part)), *([last] if kept else [])])
+
+
+def _as_in_a_file(path: list[str]) -> list[str]:
+    """Further classes of traffic, and faults of a kind, as a file and `--set` number them."""
+    match path:
+        case ["further_traffic", index, *rest]:
+            return ["traffic", str(int(index) + 1), *rest]
+        case ["faults", index, _kind, *rest]:
+            return ["faults", index, *rest]
+    return path
 
 
 def _key(item: dict[str, Any]) -> str:
@@ -102,6 +112,8 @@ def _is_branch(part: str) -> bool:
 def _suggestion(path: list[str]) -> str:
     model: type[BaseModel] = Scenario
     for part in path[:-1]:
+        if part.isdecimal():
+            continue
         field = model.model_fields.get(part)
         if field is None or not (isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel)):
             return ""

@@ -124,7 +124,7 @@ def test_a_unit_for_a_number_without_one_is_refused(value: str) -> None:
         ("duration_s=true", "duration_s"),
         ("world.no_fly_m=[[true,0,5]]", "world.no_fly_m"),
         ("traffic.sources=false", "traffic.sources"),
-        ('faults=[{kind="cut",node=true,at_s=1}]', "faults.0.cut.node"),
+        ('faults=[{kind="cut",node=true,at_s=1}]', "faults.0.node"),
     ],
 )
 def test_true_is_no_number(value: str, key: str) -> None:

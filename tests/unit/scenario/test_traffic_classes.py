@@ -62,11 +62,13 @@ def test_overrides_name_a_class_by_its_number_and_a_resolved_scenario_is_the_sam
     [
         (TWO.replace("app_2", "app_1"), "must be different"),
         (TWO.replace("app_2", "report"), "none of"),
-        (TWO.replace("destination = 4", "destination = 9"), "traffic.destination = 9"),
-        (TWO.replace("sources = [2]", "sources = [12]"), r"traffic.sources = \[12\]"),
-        (TWO + "[radio]\nmax_frame_bytes = 600\n", "traffic.payload_bytes = 1024"),
-        (TWO.replace("sources = [2]", "sources = 5"), "traffic.sources = 5 must be <= 4, the nodes that are not traf"),
+        (TWO.replace("destination = 4", "destination = 9"), "traffic.1.destination = 9"),
+        (TWO.replace("sources = [2]", "sources = [12]"), r"traffic.1.sources = \[12\]"),
+        (TWO + "[radio]\nmax_frame_bytes = 600\n", "traffic.0.payload_bytes = 1024"),
+        (TWO.replace("sources = [2]", "sources = 5"), "traffic.1.sources = 5 must be <= 4, the nodes that are not t"),
         (TWO + 'arrivals = "trace"\n', "traffic.packets: 0"),
+        (TWO.replace("sources = [2]", "on_s = -1"), "traffic.1.on_s = -1: "),
+        (TWO.replace("sources = [2]", "source = [2]"), r"traffic.1.source: unknown key; did you mean sources\?"),
     ],
 )
 def test_what_is_wrong_with_a_class_is_said(tmp_path: Path, text: str, said: str) -> None:

@@ -127,6 +127,27 @@ async def test_who_waits_for_a_swarm_of_another_name_than_the_router_has_is_told
             ), said
 
 
+LAUNCH = """import asyncio, fanet_mw
+async def main():
+    async with fanet_mw.launch("quick"): pass
+asyncio.run(main())
+"""
+
+
+@pytest.mark.parametrize(
+    ("program", "given"), [(LAUNCH, "-"), (f"if __name__ != '__main__': raise KeyError\n{LAUNCH}", "program.py")]
+)
+def test_a_program_that_its_processes_cannot_import_is_told_so_once(tmp_path: Path, program: str, given: str) -> None:
+    """One on standard input, and one that raises when it is imported: each of eleven processes printed a traceback."""
+    (tmp_path / "program.py").write_text(program)
+    ended = subprocess.run(
+        [sys.executable, given], input=program, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert ended.returncode == 1
+    assert "HostError: the processes of a swarm import the program that launches it, and that ended" in ended.stderr
+    assert ended.stderr.count("in _fixup_main_from_path") == 1
+
+
 @pytest.mark.parametrize("left_out", [(), (1, 2)])
 async def test_a_node_that_is_there_twice_ends_a_program_that_launches_and_is_named(left_out: tuple[int, ...]) -> None:
     """It waited for five minutes, and said that the router was gone."""

@@ -215,7 +215,7 @@ class Processes:
 
     async def warm_up(self) -> bool:
         """Wait until the server has imported what children need. Returns True if the emulator's kernel will be
-        compiled; raises HostError if the main program starts a swarm when it is imported.
+        compiled; raises HostError if the main program starts a swarm when it is imported, or cannot be imported.
         """
         first = self._context.Process(target=_first)
 
@@ -235,6 +235,11 @@ class Processes:
             raise HostError(
                 "the processes of a swarm import the program that launches it, and this program launches a swarm "
                 'whenever it is imported: put the launch below `if __name__ == "__main__":`'
+            )
+        if code is not None and code > 0 and code not in (_MUST_COMPILE, _UNKNOWN_END):
+            raise HostError(
+                f"the processes of a swarm import the program that launches it, and that ended with {described(code)}: "
+                "it must be a file that can be imported"
             )
         return code == _MUST_COMPILE
 

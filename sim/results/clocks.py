@@ -4,9 +4,10 @@ A node knows only its own estimate of swarm time. The simulation also knows the 
 that nodes have measured, and tell how wrong each clock was.
 """
 
+from bisect import bisect
 from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +17,9 @@ from fanet_mw.units import US, S
 from sim.records.record_kinds import records_of
 from sim.records.trace_log import TraceLog
 from sim.results.outcome import Outcome
+
+_FASTEST: Final = 1e-3
+"""The greatest rate error of a clock (`clock.drift_ppm`)."""
 
 
 def true_delays(records: TraceLog) -> Collection[Record]:
@@ -30,9 +34,40 @@ def _true_delay(record: Delivered, born: Mapping[tuple[int, int], int]) -> Deliv
 
 
 def errors_ns(samples: Sequence[ClockSampled]) -> list[tuple[ClockSampled, int]]:
-    """Each sample with its true error: against the reference's clock at that instant, or against true time."""
-    ahead = {(sample.t_ns, sample.node): sample.ahead_ns for sample in samples}
-    return [(sample, sample.ahead_ns - ahead.get((sample.t_ns, sample.reference), 0)) for sample in samples]
+    """Each sample with its true error: against the reference's clock at that instant, or without a reference against
+    true time.
+    """
+    own: dict[int, dict[int, int]] = defaultdict(dict)
+    for sample in samples:
+        own[sample.node][sample.t_ns] = sample.ahead_ns
+    clocks = {node: _Clock(ahead_ns) for node, ahead_ns in own.items()}
+    return [
+        (sample, sample.ahead_ns - (clocks[sample.reference].ahead_ns(sample.t_ns) if sample.reference in own else 0))
+        for sample in samples
+    ]
+
+
+class _Clock:
+    """By how much one node's swarm time was ahead. While its program does not run it has no samples, and its clock,
+    which others follow on, goes on as before.
+    """
+
+    def __init__(self, samples: Mapping[int, int]) -> None:
+        """`samples`: ahead [ns] by instant [ns]."""
+        self._samples = samples
+        self._instants = sorted(samples)
+
+    def ahead_ns(self, t_ns: int) -> int:
+        found = self._samples.get(t_ns)
+        if found is not None:
+            return found
+        last = max(0, bisect(self._instants, t_ns) - 1)
+        last_ns, before_ns = self._instants[last], self._instants[max(0, last - 1)]
+        gained_ns = self._samples[last_ns] - self._samples[before_ns]
+        if abs(gained_ns) > _FASTEST * (last_ns - before_ns):
+            gained_ns = 0  # the clock jumped, or was set
+        rate = gained_ns / (last_ns - before_ns) if last_ns > before_ns else 0.0
+        return self._samples[last_ns] + round(rate * (t_ns - last_ns))
 
 
 def clock_errors(outcome: Outcome) -> dict[str, Any]:

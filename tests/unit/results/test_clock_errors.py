@@ -1,6 +1,7 @@
 """What clocks did to a run, on samples written by hand."""
 
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 
@@ -15,7 +16,7 @@ from sim.results.outcome import Outcome
 MakeScenario = Callable[..., Scenario]
 
 
-def errors(make_scenario: MakeScenario, *records: Record) -> dict[str, object]:
+def errors(make_scenario: MakeScenario, *records: Record) -> dict[str, Any]:
     scenario = make_scenario(**{"nodes.count": 2, "clock.sync": "beacons", "clock.drift_ppm": 10})
     return clock_errors(Outcome(scenario, "virtual", 1.0, list(records), {}))
 
@@ -29,6 +30,17 @@ def test_an_error_is_against_the_clock_of_the_reference(make_scenario: MakeScena
     assert found["error_us"] == {"p50": 1.5, "p99": pytest.approx(2.97), "max": 3.0}
     assert found["beyond_bound"] == 0
     assert (found["bound_us"], found["samples"], found["synced_after_s"]) == (10, 2, 5)
+
+
+def test_while_the_program_of_the_reference_does_not_run_its_clock_is_taken_to_go_on_as_before(
+    make_scenario: MakeScenario,
+) -> None:
+    own = [sample(1, 900 + 5 * t_s, bound_us=0, t_s=t_s) for t_s in (1, 2, 3, 7)]
+    found = errors(make_scenario, *own, *(sample(2, 903 + 5 * t_s, t_s=t_s) for t_s in (3, 4, 6)))
+    assert found["error_us"]["max"] == 3.0
+    jumped = [sample(1, 900, bound_us=0, t_s=1), sample(1, 300_900, bound_us=0, t_s=2)]
+    assert errors(make_scenario, *jumped, sample(2, 300_903, t_s=6))["error_us"]["max"] == 3.0
+    assert errors(make_scenario, sample(2, 7, t_s=6, reference=9))["error_us"]["max"] == 7.0, "nobody's clock"
 
 
 @pytest.mark.parametrize(("error_us", "beyond"), [(10, 0), (10.001, 1), (-10.001, 1), (19, 1)])

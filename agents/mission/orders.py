@@ -37,8 +37,9 @@ class KnownOrders:
             return False
         self._learned_ns[told] = now_ns
         order, latest = told.order, self._latest
+        ends = order.kind is OrderKind.END  # for good, whatever was learned of later orders before
         overruled = latest is not None and (
-            latest.order.kind is OrderKind.END or not newer(told.serial, latest.serial, bits=_SERIAL_BITS)
+            latest.order.kind is OrderKind.END or not (ends or newer(told.serial, latest.serial, bits=_SERIAL_BITS))
         )
         if order.kind is not OrderKind.NO_FLY and order.node in (0, self._node) and not overruled:
             self._latest = told

@@ -40,6 +40,17 @@ def test_the_end_is_for_good_and_a_release_ends_an_errand() -> None:
     assert not known.is_to_obey(again)
 
 
+@pytest.mark.parametrize("kind", [OrderKind.RELEASE, OrderKind.STAY, OrderKind.RECALL])
+def test_the_end_is_for_good_too_for_who_learns_of_a_later_order_first(kind: OrderKind) -> None:
+    known = KnownOrders(NodeId(3))
+    known.learn(later := told(4, kind), 0)
+    assert known.is_to_obey(later)
+    known.learn(end := told(3, OrderKind.END), S)
+    assert known.is_to_obey(end)
+    assert not known.is_to_obey(later)
+    assert known.errand is None
+
+
 def test_an_order_is_learned_once_and_told_on_for_a_while() -> None:
     known = KnownOrders(NodeId(3))
     assert known.learn(GIVEN[2], S)

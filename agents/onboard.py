@@ -187,6 +187,11 @@ class Onboard:
                 first_ns = wake_ns
         return first_ns
 
+    def due(self, now_ns: int) -> list[str]:
+        """The applications that want to be woken by now, by name."""
+        asked = [(timed, timed.next_wake_ns()) for timed in self._callbacks.next_wake_ns]
+        return [said(timed) for timed, wake_ns in asked if wake_ns is not None and wake_ns <= now_ns]
+
     # --- output ---------------------------------------------------------------------------------------------------
 
     def send(self, application: Application, submission: Submission) -> int:

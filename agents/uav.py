@@ -230,6 +230,11 @@ class Uav(Actor):
         own_ns, node_ns = self._own_wake_ns, self._node.next_wake_ns()
         return own_ns if node_ns is None or (own_ns is not None and own_ns < node_ns) else node_ns
 
+    def due(self, now_ns: int) -> list[str]:
+        node_ns = self._node.next_wake_ns()
+        protocol = f"routing.protocol = {self._node.scenario.routing.protocol!r}"
+        return [*self._onboard.due(now_ns), *([protocol] if node_ns is not None and node_ns <= now_ns else [])]
+
     def state(self, now_ns: int) -> NodeState:
         owing = self._onboard.owes_receipts or self._node.holds_own
         return NodeState(self._hellos.neighbors(now_ns), self._node.bound_ns(), self._node.clusters(), owing)

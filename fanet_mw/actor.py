@@ -14,7 +14,7 @@ lists by lists of its own before `start`; the actor only appends to them, and on
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from numbers import Integral
 from typing import Any
 
@@ -58,6 +58,10 @@ class Actor(ABC):
     @abstractmethod
     def next_wake_ns(self) -> int | None:
         """The instant of the next `wake`, or None if none is wanted. An instant in the past means at once."""
+
+    def due(self, now_ns: int) -> Sequence[str]:
+        """The parts that want to be woken by now, by name: what an error says of an actor that always wants to be."""
+        return ()
 
     def nudge(self, now_ns: int) -> None:  # noqa: B027  (most actors have no part that is used from outside)
         """Code outside of the actor has given one of its parts something to do, which it should do now."""

@@ -113,6 +113,9 @@ class ClockedUav(Actor):
             return self._sample_ns
         return min(self._sample_ns, self._true_ns(wanted_ns))
 
+    def due(self, now_ns: int) -> list[str]:
+        return self._uav.due(self._local_now_ns())
+
     def stop(self, now_ns: int) -> None:
         self._uav.stop(self._advance_to(now_ns))
         self._hand_over(now_ns)

@@ -146,9 +146,10 @@ class VirtualHost:
         """Count wake-ups that do not advance time: a few are normal, an endless series is a bug in an actor."""
         self._stalled += 1
         if self._stalled > max(_STALL_LIMIT, _STALL_SHARE * len(self._actors)):
+            last = self._actors[index]
             raise LocalProtocolError(
                 f"actors asked to be woken {self._stalled} times at {self.now_ns / S} s, "
-                f"{self._actors[index].name} the last"
+                f"{last.name} the last: {', '.join(last.due(self.now_ns))}".removesuffix(": ")
             )
 
     def _flush(self, awake: dict[int, None]) -> None:

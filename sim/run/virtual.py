@@ -341,6 +341,9 @@ class StoppableUav(Actor):
         due_ns = None if self.alive is None else self.alive.next_wake_ns()
         return min([*own, *([] if due_ns is None else [due_ns])], default=None)
 
+    def due(self, now_ns: int) -> Sequence[str]:
+        return () if self.alive is None else self.alive.due(now_ns)
+
     def nudge(self, now_ns: int) -> None:
         if self.alive is not None:
             self.alive.nudge(now_ns)

@@ -428,6 +428,10 @@ class Scribe(Application):
     def __init__(self, scenario, node, options): pass
     def next_wake_ns(self): return 2_600_000_000
     def wake(self, now_ns): self.port.record("seen")
+class Restless(Scribe):
+    def wake(self, now_ns): pass
+class Sleepless(Flooding):
+    def next_wake_ns(self): return 2_600_000_000
 class Tapper(Scribe):
     def wake(self, now_ns): self.port.tap(b"no frame")
 class Patient(Scribe):
@@ -458,6 +462,11 @@ class Novelist(Scribe):
             "applications=[{use='wrong:Scribe'}]",
             "application 'scribe' (wrong:Scribe): record() takes a record of fanet",
         ),
+        (
+            "applications=[{use='wrong:Restless',nodes=[3]}]",
+            "at 2.6 s, agent-3 the last: application 'scribe' (wrong:R",
+        ),
+        ("routing.protocol=wrong:Sleepless", " the last: routing.protocol = 'wrong:Sleepless'"),
         ("applications=[{use='wrong:Tapper'}]", "application 'scribe' (wrong:Tapper): tap(): no MAVLink 2 frame at by"),
         ("applications=[{use='wrong:Patient'}]", "lifetime_ns = 0.5 must be a whole number of ns above 0"),
         ("applications=[{use='wrong:Greeter'}]", "application 'scribe' (wrong:Greeter): hello_frames(): no MAVLink 2"),

@@ -64,10 +64,17 @@ def change(endpoint: str, swarm: str | None, control: Control, *, zenoh_config: 
         done = put_and_watch(bus, names.radio_control, control, names.trace("emulator"), confirms)
         if not done:
             raise FanetError(
-                f"the emulator did not confirm within {CONFIRM_TIMEOUT_S:g} s: refused (see `refused` in its report), "
-                f"or no emulator on {names.radio_control}"
+                f"the emulator did not confirm within {CONFIRM_TIMEOUT_S:g} s: {_refused(control)}, or no emulator on "
+                f"{names.radio_control}"
             )
         return [record for record in done if isinstance(record, RadioFault)]
+
+
+def _refused(control: Control) -> str:
+    """Why an emulator that is there has recorded nothing of a change."""
+    if not isinstance(control, Restore):
+        return "refused (see `refused` in its report)"
+    return f"no fault has the label {control.label!r}" if control.label else "no fault is in force"
 
 
 def impossible(control: Control, tree: Mapping[str, Any], swarm: str) -> str | None:

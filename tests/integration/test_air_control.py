@@ -75,16 +75,25 @@ async def test_a_node_is_cut_off_and_restored_by_command(capsys: pytest.CaptureF
     assert json.loads(last.json)["controls"] == 4
 
 
-@pytest.mark.parametrize("control", [Cut("x", NodeId(99)), Restore("nothing")], ids=["no such node", "no such label"])
-async def test_what_the_emulator_refuses_is_said_and_counted(control: Control, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("control", "why", "refused"),
+    [
+        (Cut("x", NodeId(99)), "refused", 1),
+        (Restore("nothing"), "no fault has the label 'nothing'", 1),
+        (Restore(""), "no fault is in force", 0),
+    ],
+)
+async def test_what_the_emulator_refuses_is_said_and_counted(
+    control: Control, why: str, refused: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(operator_commands, "CONFIRM_TIMEOUT_S", 1.2)
     reports: list[bytes] = []
     async with emulator("air-test", reports) as (endpoint, _):
-        with pytest.raises(FanetError, match=r"did not confirm within 1\.2 s: refused"):
+        with pytest.raises(FanetError, match=rf"did not confirm within 1\.2 s: {why}"):
             await asyncio.to_thread(operator_commands.change, endpoint, None, control)
     (last,) = codecs.decode(reports[-1])
     assert isinstance(last, Report)
-    assert sum(json.loads(last.json)["refused"].values()) == 1
+    assert sum(json.loads(last.json)["refused"].values()) == refused
 
 
 async def test_without_a_swarm_or_with_two_the_command_asks_for_the_name() -> None:

@@ -175,9 +175,16 @@ def obstacles(scenario: Scenario, starts: Rows) -> Obstacles:
     for east, north, width, depth, height in world.buildings:
         box = Box(east, north, width, depth, height + (hills.height_m(east, north) if hills else 0.0))
         if box.near(starts, margin_m=0.0):
-            raise ConfigError(f"world.buildings: a node starts within the building at [{east:g}, {north:g}]")
+            raise ConfigError(
+                f"world.buildings: node {_first_in(box, starts)} starts within the building at [{east:g}, {north:g}]"
+            )
         boxes.append(box)
     return Obstacles(hills, tuple(boxes))
+
+
+def _first_in(box: Box, starts: Rows) -> int:
+    """The first node that starts within a building."""
+    return next(row + 1 for row in range(len(starts)) if box.near(starts[row : row + 1], margin_m=0.0))
 
 
 def town_of(world: World) -> footprints.Town:
@@ -215,7 +222,8 @@ def _of_file(world: World, hills: Hills | None, starts: Rows) -> Iterator[Box]:
         box = Box(east, north, width, depth, height + (hills.height_m(east, north) if hills else 0.0), yaw)
         if box.near(starts, margin_m=0.0):
             raise ConfigError(
-                f"world.buildings_geojson: a node starts within the building at [{east:.0f}, {north:.0f}]"
+                f"world.buildings_geojson: node {_first_in(box, starts)} starts within the building at "
+                f"[{east:.0f}, {north:.0f}]"
             )
         yield box
 

@@ -20,7 +20,8 @@ IMPOSSIBLE = [
     ('world.heightmap="small.asc"', r"covers 2 m to the east, which must be >= world.area_m = 800"),
     ('world.buildings_geojson="none.json"', r"none.json is no GeoJSON of buildings: it holds no Polygon"),
     ("world.no_fly_m=[[0,0,50]]", r"world.no_fly_m.0: node 1 starts within it"),
-    ("world.buildings=[[0,0,300,300,200]]", r"a node starts within the building at \[0, 0\]"),
+    ("world.buildings=[[0,0,300,300,200]]", r"node 1 starts within the building at \[0, 0\]"),
+    ("world.buildings=[[500,500,9,9,9],[20,0,9,9,60]]", r"node 6 starts within the building at \[20, 0\]"),
     ("world.base_m=[100000,0]", r"world.base_m = \[100000, 0\] must be within \+-2 x world.area_m = 1600"),
 ]
 

@@ -311,5 +311,5 @@ def test_buildings_far_from_the_origin_and_on_a_start_are_refused(make_scenario:
     with pytest.raises(ConfigError, match=r"the middle of the file is \[.*: are longitude and latitude exchanged"):
         obstacles(exchanged, np.array(positions(exchanged)))
     there = make_scenario(**{"world.buildings_geojson": path, "nodes.count": 1})
-    with pytest.raises(ConfigError, match="a node starts within the building"):
+    with pytest.raises(ConfigError, match="node 1 starts within the building"):
         obstacles(there, np.array(positions(there)))

@@ -12,6 +12,8 @@ from agents.mission.finding.phone_localization import Estimate
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.search_formation.formation_planner import pattern_of
 from agents.mission.search_formation.pattern import Pattern
+from agents.mission.search_formation.shapes.contract import BACK
+from agents.mission.search_formation.ways_there import detours
 from fanet_mw.motion import Motion
 from fanet_mw.units import MS, STILL, US, Enu, NodeId, S
 from fanet_mw.wire.search_plan import Search
@@ -48,6 +50,8 @@ _CLOSES_S: Final = 15.0
 """The time within which ranks are closed."""
 _APART_S: Final = 40.0
 """For so long after a loss, while the swarm is apart, a UAV follows a neighbor fewer ties away from another part."""
+_USED: Final = 0.9
+"""The share of the time on the way to the places that detours may take, at the speed of the way back."""
 _FLOWN_NS: Final = 8 * S
 """So long after they began to close ranks most UAVs are at their new places."""
 
@@ -70,6 +74,10 @@ class SearchPlace:
         """Where this UAV was when it received its first plan, or had taken off after that."""
         self._left_ns = 0
         """The instant at which it leaves that position."""
+        self._is_first = True
+        """Whether the plan has the first formation that this UAV knows, and not another one after losses."""
+        self._over: dict[int, tuple[Enu, int]] = {}
+        """Over which place on the way to the first formation the UAV of a place flies, and when; most fly straight."""
         self._gaps: frozenset[int] = frozenset()
         """The places of lost UAVs."""
         self._parted: Collection[int] = ()
@@ -95,6 +103,7 @@ class SearchPlace:
         """Follow a plan from now on."""
         made, before = pattern_of(plan, reach_m=self._reach_m), self.pattern
         first = self.place is None or before is None or before.dimensions != made.dimensions
+        self._is_first &= before is None or before.dimensions == made.dimensions
         self.plan, self.pattern = plan, made
         self.place = plan.nodes.index(self._node) if self._node in plan.nodes else None
         if first:
@@ -202,7 +211,9 @@ class SearchPlace:
             if seen is not None:
                 start, seen_ns = seen
                 from_ns, goal = max(seen_ns, plan.start_us * US), pattern.at(place, 0.0)
-                at, velocity = _on_way(start, goal, from_ns=from_ns, to_ns=_taken_up_ns(plan), now_ns=now_ns)
+                at, velocity = _on_way(
+                    start, goal, from_ns=from_ns, to_ns=_taken_up_ns(plan), now_ns=now_ns, over=self._over.get(place)
+                )
                 ways[place] = Motion(at, velocity, now_ns)
         return ways
 
@@ -210,6 +221,22 @@ class SearchPlace:
         """Set out for the place from where this UAV is, when the plan begins."""
         begins_ns = now_ns if self.plan is None else self.plan.start_us * US
         self._left_from, self._left_ns = self._own_motion.over_ground(now_ns), max(now_ns, begins_ns)
+        self._over = self._detours() if self._is_first else {}
+
+    def _detours(self) -> dict[int, tuple[Enu, int]]:
+        plan, pattern, here = self.plan, self.pattern, self._left_from
+        if plan is None or pattern is None or here is None or not self._view_m:
+            return {}
+        begins_ns, arrival_ns = plan.start_us * US, _taken_up_ns(plan)
+        starts = {place: self._seen[node][0] for place, node in enumerate(plan.nodes) if node in self._seen}
+        if self.place is not None:
+            starts[self.place] = here
+        most_m = _USED * BACK * plan.speed_m_s * (arrival_ns - begins_ns) / S
+        found = {}
+        for place, over in detours(pattern, starts, view_m=self._view_m, most_m=most_m).items():
+            to_m, from_m = starts[place].horizontal_to(over), over.horizontal_to(pattern.at(place, 0.0))
+            found[place] = over, begins_ns + round(to_m / (to_m + from_m) * (arrival_ns - begins_ns))
+        return found
 
     def leave(self) -> None:
         """Give up the place, even if the plan still has it."""
@@ -246,7 +273,10 @@ class SearchPlace:
         if now_ns >= arrival_ns or self._left_from is None:
             swept_s = (now_ns - arrival_ns) / S
             return pattern.at(place, swept_s), pattern.velocity(place, swept_s)
-        return _on_way(self._left_from, pattern.at(place, 0.0), from_ns=self._left_ns, to_ns=arrival_ns, now_ns=now_ns)
+        return _on_way(
+            self._left_from, pattern.at(place, 0.0), from_ns=self._left_ns, to_ns=arrival_ns, now_ns=now_ns,
+            over=self._over.get(place),
+        )  # fmt: skip
 
     # --- how far it may go from there -----------------------------------------------------------------------------
 
@@ -393,8 +423,17 @@ def _beside(lane: Enu, moves: Enu, ahead_m: float, aside_m: float) -> Enu:
     return Enu(lane.east + ahead_m * east + aside_m * north, lane.north + ahead_m * north - aside_m * east, lane.up)
 
 
-def _on_way(start: Enu, goal: Enu, *, from_ns: int, to_ns: int, now_ns: int) -> tuple[Enu, Enu]:
-    """The position and velocity of a UAV that flies straight from `start` to `goal`, to be there at `to_ns`."""
+def _on_way(
+    start: Enu, goal: Enu, *, from_ns: int, to_ns: int, now_ns: int, over: tuple[Enu, int] | None = None
+) -> tuple[Enu, Enu]:
+    """The position and velocity of a UAV that flies straight from `start` to `goal`, to be there at `to_ns`. `over`:
+    another place over which it flies at an instant, if it leaves before.
+    """
+    if over is not None and from_ns < over[1]:
+        if now_ns < over[1]:
+            goal, to_ns = over
+        else:
+            start, from_ns = over
     span_ns = to_ns - from_ns
     if now_ns <= from_ns or span_ns <= 0:
         return start, STILL

@@ -1,0 +1,98 @@
+"""The ways of UAVs to their places, some with a detour so that cameras show what lies among the swarm.
+
+A sweep that begins around the swarm leaves behind the places between where UAVs stood. Who is there is heard, but where
+walls or trees weaken a phone the estimate is wrong, and nobody comes by again for minutes. Most UAVs have time left on
+their way: the nearest such place that is still to be shown goes to whoever needs least for it.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
+from typing import Final
+
+from agents.mission.search_formation.pattern import Pattern
+from fanet_mw.units import Enu
+
+_CELL_M: Final = 40.0
+"""The side of the cells for which it is known whether a camera will show them."""
+_SWEPT_S: Final = 10.0
+"""The time step at which it is looked where the sweep leads."""
+_LONGEST_M: Final = 220.0
+"""No detour makes a way longer by more than this."""
+_Cell = tuple[int, int]
+
+
+def detours(pattern: Pattern, starts: Mapping[int, Enu], *, view_m: float, most_m: float) -> dict[int, Enu]:
+    """The place over which each UAV flies on the way to its own place, by that place; whoever flies straight is left
+    out. `starts`: where the UAV of each place is; `view_m`: how far a camera shows the ground to each side; `most_m`:
+    the longest way that there is time for.
+    """
+    goals = {place: pattern.at(place, 0.0) for place in starts}
+    unseen = set(_among(starts))
+    for place, start in starts.items():
+        unseen.difference_update(_shown(start, goals[place], view_m))
+    unseen.difference_update(_swept(pattern, view_m))
+    straight_m = {place: start.horizontal_to(goals[place]) for place, start in starts.items()}
+    shows = {cell: sum(other in unseen for other in _near(cell, view_m)) for cell in unseen}
+    found: dict[int, Enu] = {}
+    while shows:
+        cell = max(shows, key=lambda cell: (shows[cell], cell))
+        del shows[cell]
+        over, best = _at(cell), (math.inf, -1)
+        for place, way_m in straight_m.items():
+            longer_m = starts[place].horizontal_to(over) + over.horizontal_to(goals[place]) - way_m
+            if longer_m <= min(_LONGEST_M, most_m - way_m):
+                best = min(best, (longer_m, place))
+        place = best[1]
+        if place < 0:
+            continue
+        del straight_m[place]
+        found[place] = over._replace(up=goals[place].up)
+        for a, b in pairwise((starts[place], over, goals[place])):
+            for shown in unseen.intersection(_shown(a, b, view_m)):
+                unseen.discard(shown)
+                shows.pop(shown, None)
+                for other in _near(shown, view_m):
+                    if other in shows:
+                        shows[other] -= 1
+    return found
+
+
+def _at(cell: _Cell) -> Enu:
+    return Enu(cell[0] * _CELL_M, cell[1] * _CELL_M, 0.0)
+
+
+def _among(starts: Mapping[int, Enu]) -> Iterator[_Cell]:
+    """The cells of the rectangle in which the UAVs are."""
+    east, north = [at.east for at in starts.values()], [at.north for at in starts.values()]
+    for column in range(math.ceil(min(east) / _CELL_M), math.floor(max(east) / _CELL_M) + 1):
+        for row in range(math.ceil(min(north) / _CELL_M), math.floor(max(north) / _CELL_M) + 1):
+            yield column, row
+
+
+def _shown(a: Enu, b: Enu, view_m: float) -> Iterator[_Cell]:
+    """The cells that a camera shows whose UAV flies straight from one position to another."""
+    steps = max(1, math.ceil(a.horizontal_to(b) / _CELL_M))
+    for step in range(steps + 1):
+        share = step / steps
+        yield from _below(a.east + share * (b.east - a.east), a.north + share * (b.north - a.north), view_m)
+
+
+def _near(cell: _Cell, view_m: float) -> Iterator[_Cell]:
+    return _below(cell[0] * _CELL_M, cell[1] * _CELL_M, view_m)
+
+
+def _below(east: float, north: float, view_m: float) -> Iterator[_Cell]:
+    for column in range(math.ceil((east - view_m) / _CELL_M), math.floor((east + view_m) / _CELL_M) + 1):
+        for row in range(math.ceil((north - view_m) / _CELL_M), math.floor((north + view_m) / _CELL_M) + 1):
+            yield column, row
+
+
+def _swept(pattern: Pattern, view_m: float) -> Iterator[_Cell]:
+    """The cells that lie ahead of the formation; what is between two lanes is shown on the way back."""
+    wide_m = max(view_m, pattern.shape.lane_m / 2)
+    teams = range(pattern.dimensions.fixed - pattern.dimensions.relays)
+    for step in range(math.ceil(pattern.shape.sweep_s / _SWEPT_S) + 1):
+        for place in teams:
+            at = pattern.at(place, step * _SWEPT_S)
+            yield from _below(at.east, at.north, wide_m)

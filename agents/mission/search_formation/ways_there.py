@@ -27,6 +27,7 @@ def detours(pattern: Pattern, starts: Mapping[int, Enu], *, view_m: float, most_
     out. `starts`: where the UAV of each place is; `view_m`: how far a camera shows the ground to each side; `most_m`:
     the longest way that there is time for.
     """
+    starts = {place: _at(_cell(start)) for place, start in starts.items()}  # the same to all, though they err
     goals = {place: pattern.at(place, 0.0) for place in starts}
     unseen = set(_among(starts))
     for place, start in starts.items():
@@ -56,6 +57,10 @@ def detours(pattern: Pattern, starts: Mapping[int, Enu], *, view_m: float, most_
                     if other in shows:
                         shows[other] -= 1
     return found
+
+
+def _cell(at: Enu) -> _Cell:
+    return round(at.east / _CELL_M), round(at.north / _CELL_M)
 
 
 def _at(cell: _Cell) -> Enu:

@@ -6,7 +6,7 @@ their way: the nearest such place that is still to be shown goes to whoever need
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Final
 
@@ -19,6 +19,10 @@ _SWEPT_S: Final = 10.0
 """The time step at which it is looked where the sweep leads."""
 _LONGEST_M: Final = 220.0
 """No detour makes a way longer by more than this."""
+_MOST_CELLS: Final = 20_000
+"""Over a larger area, and before a sweep that takes longer than `_MOST_SWEPT_S`, all fly straight: what others state
+must not cost this node much time."""
+_MOST_SWEPT_S: Final = 3_000.0
 _Cell = tuple[int, int]
 
 
@@ -27,9 +31,13 @@ def detours(pattern: Pattern, starts: Mapping[int, Enu], *, view_m: float, most_
     out. `starts`: where the UAV of each place is; `view_m`: how far a camera shows the ground to each side; `most_m`:
     the longest way that there is time for.
     """
-    starts = {place: _at(_cell(start)) for place, start in starts.items()}  # the same to all, though they err
-    goals = {place: pattern.at(place, 0.0) for place in starts}
-    unseen = set(_among(starts))
+    at_start = {place: _at(_cell(start)) for place, start in starts.items()}  # the same to all, though they err
+    goals = {place: pattern.at(place, 0.0) for place in at_start}
+    starts = {place: at for place, at in at_start.items() if at.horizontal_to(goals[place]) <= most_m}
+    columns, rows = _spanned([at.east for at in starts.values()]), _spanned([at.north for at in starts.values()])
+    if len(columns) * len(rows) > _MOST_CELLS or pattern.shape.sweep_s > _MOST_SWEPT_S:
+        return {}
+    unseen = {(column, row) for column in columns for row in rows}
     for place, start in starts.items():
         unseen.difference_update(_shown(start, goals[place], view_m))
     unseen.difference_update(_swept(pattern, view_m))
@@ -67,12 +75,9 @@ def _at(cell: _Cell) -> Enu:
     return Enu(cell[0] * _CELL_M, cell[1] * _CELL_M, 0.0)
 
 
-def _among(starts: Mapping[int, Enu]) -> Iterator[_Cell]:
-    """The cells of the rectangle in which the UAVs are."""
-    east, north = [at.east for at in starts.values()], [at.north for at in starts.values()]
-    for column in range(math.ceil(min(east) / _CELL_M), math.floor(max(east) / _CELL_M) + 1):
-        for row in range(math.ceil(min(north) / _CELL_M), math.floor(max(north) / _CELL_M) + 1):
-            yield column, row
+def _spanned(values: Sequence[float]) -> range:
+    """The columns or rows of cells between the least and the greatest of these positions."""
+    return range(math.ceil(min(values) / _CELL_M), math.floor(max(values) / _CELL_M) + 1) if values else range(0)
 
 
 def _shown(a: Enu, b: Enu, view_m: float) -> Iterator[_Cell]:
@@ -95,7 +100,7 @@ def _below(east: float, north: float, view_m: float) -> Iterator[_Cell]:
 
 def _swept(pattern: Pattern, view_m: float) -> Iterator[_Cell]:
     """The cells that lie ahead of the formation; what is between two lanes is shown on the way back."""
-    wide_m = max(view_m, pattern.shape.lane_m / 2)
+    wide_m = max(view_m, min(pattern.shape.lane_m / 2, 2 * view_m))
     teams = range(pattern.dimensions.fixed - pattern.dimensions.relays)
     for step in range(math.ceil(pattern.shape.sweep_s / _SWEPT_S) + 1):
         for place in teams:

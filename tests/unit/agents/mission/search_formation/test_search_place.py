@@ -1,15 +1,19 @@
 """The place of a UAV in the formation of a search: taking it up, staying near it."""
 
+import itertools
+import math
 from collections.abc import Collection
 
 import pytest
-from search_board import FOLLOWER, LINE, PLAN, TAKEN_UP_NS, UP_M, Board, lane_of
+from search_board import FOLLOWER, LINE, PLAN, REACH_M, TAKEN_UP_NS, UP_M, Board, lane_of
 
 from agents.mission.finding.phone_localization import Estimate
+from agents.mission.hungarian import assign
 from agents.mission.search_formation.formation_planner import plan_of
 from agents.mission.search_formation.pattern import fitted
 from agents.mission.search_formation.shapes.contract import Demands, ShapeName
 from fanet_mw.units import STILL, US, Enu, NodeId, S
+from fanet_mw.wire.search_plan import Search
 
 
 def test_who_has_no_plan_waits_where_it_is() -> None:
@@ -25,6 +29,62 @@ def test_a_place_is_taken_up_on_a_straight_way_that_begins_and_ends_with_the_pla
     half = board.place.lane(35 * S)[0]
     assert (half.east, half.north) == pytest.approx((end.east / 2, (end.north - 400) / 2))
     assert (board.place.is_taken_up(TAKEN_UP_NS - 1), board.place.is_taken_up(TAKEN_UP_NS)) == (False, True)
+
+
+def around_swarm() -> tuple[Search, dict[int, Enu]]:
+    """A plan of lines that begin around 45 UAVs which stand in a grid, and where each of them is."""
+    made = fitted(45, Demands(2500, 131, REACH_M, 65, 7.5))
+    assert made is not None
+    stand = {node: Enu(200.0 * ((node - 1) % 9) - 800, 200.0 * ((node - 1) // 9) - 400, UP_M) for node in range(1, 46)}
+    begun = made.begun_around([*stand.values()])[0]
+    goals = [begun.at(place, 0.0) for place in range(45)]
+    nodes = [0] * 45
+    for node, place in enumerate(assign([[at.horizontal_to(g) ** 2 for g in goals] for at in stand.values()]), start=1):
+        nodes[place] = node
+    return plan_of(begun, tuple(nodes), planner=1, start_us=10_000_000, deploy_ds=450), stand
+
+
+@pytest.mark.parametrize("has_camera", [True, False])
+def test_some_uavs_fly_to_their_places_over_what_no_camera_would_show_and_others_expect_them_there(
+    has_camera: bool,
+) -> None:
+    plan, stand = around_swarm()
+    arrival_ns, aside = 55 * S, 0
+    watcher = Board(1, stand[1], plan=None, look_m=65.0 if has_camera else math.inf)
+    for node, at in stand.items():
+        watcher.place.see(node, at, 0)
+    watcher.place.adopt(plan, 0)
+    for place, node in enumerate(plan.nodes):
+        board = Board(node, stand[node], plan=None, look_m=65.0 if has_camera else math.inf)
+        for other, at in stand.items():
+            board.place.see(other, at, 0)
+        board.place.adopt(plan, 0)
+        goal = board.place.lane(arrival_ns)[0]
+        ways = [board.place.lane(second * S)[0] for second in range(10, 56)]
+        flown_m = sum(a.horizontal_to(b) for a, b in itertools.pairwise(ways))
+        straight_m = stand[node].horizontal_to(goal)
+        aside += flown_m > straight_m + 1
+        assert flown_m <= max(straight_m, 0.9 * 9 * 45) + 30
+        assert ways[-1] == goal
+        if node != 1:
+            for second in (15, 30, 50):
+                expected = watcher.place.likely_ways([place], second * S)[place].position
+                assert expected.horizontal_to(ways[second - 10]) < 1e-6, "they know each other's detours"
+    assert (aside > 20) is has_camera
+    assert (aside == 0) is not has_camera
+
+
+def test_to_another_formation_after_losses_all_fly_straight() -> None:
+    plan, stand = around_swarm()
+    board = Board(23, stand[23], plan=None, look_m=65.0)
+    for node, at in stand.items():
+        board.place.see(node, at, 0)
+    board.place.adopt(plan._replace(last_m=plan.last_m - 100), 0)
+    board.place.adopt(plan, 0)
+    ways = [board.place.lane(second * S)[0] for second in (10, 30, 55)]
+    assert ways[0].horizontal_to(ways[1]) + ways[1].horizontal_to(ways[2]) == pytest.approx(
+        ways[0].horizontal_to(ways[2])
+    )
 
 
 def test_nobody_hurries_over_a_lost_uav_that_had_left_its_place() -> None:

@@ -3,7 +3,7 @@
 A sweep that begins around the swarm leaves behind the places between where UAVs stood. Who is there is heard, but where
 walls or trees weaken a phone the estimate is wrong, and nobody comes by again for minutes. Most UAVs have time left on
 their way: the spot from which a camera shows most of what is left goes to whoever needs least for it. Each UAV computes
-the detours of all, and ties keep it in reach of the others (`connectivity_maintenance.py`).
+the detours of all, and ties keep it in reach of the others (`agents/mission/flight/connectivity_maintenance.py`).
 """
 
 import math

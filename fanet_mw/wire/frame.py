@@ -375,11 +375,11 @@ TARGETS: Final = Spec(53014, 54, struct.Struct("<32HBB"))
 LOADS: Final = Spec(53015, 190, struct.Struct("<56HBB"))
 HEARD: Final = Spec(53016, 200, struct.Struct("<64BBBB"))
 HELD: Final = Spec(53017, 58, struct.Struct("<16I16HBB"))
-SEARCH: Final = Spec(53020, 197, struct.Struct("<QffffffHHHBBBBBB200B"))
+SEARCH: Final = Spec(53020, 215, struct.Struct("<QffffffHHHBBBBBB200B"))
 STATUS: Final = Spec(53021, 210, struct.Struct("<QfffHHBBB"))
 BIDS: Final = Spec(53022, 212, struct.Struct("<12H12H12H12HH12BBB"))
 FOUND: Final = Spec(53023, 195, struct.Struct("<QIfffffHBB"))
-ROLL: Final = Spec(53025, 30, struct.Struct("<IHHB200B"))
+ROLL: Final = Spec(53025, 142, struct.Struct("<IHHB200B"))
 ORDER: Final = Spec(53026, 213, struct.Struct("<QfffHHHBB"))
 SPECS: Final = (
     ROUTE, BEACON, SCHEDULE, SURVIVOR, CHUNK, TIME, JOIN, DIGEST, PLACES, ROUTING, LINKS,

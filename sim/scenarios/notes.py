@@ -7,7 +7,6 @@ import re
 from collections.abc import Iterator
 from typing import Final, get_args
 
-from agents.mission.searcher import formation
 from fanet_mw.errors import ConfigError
 from fanet_mw.graph.topology import levels, within_range
 from fanet_mw.scenario import Scenario
@@ -159,8 +158,12 @@ def _without_place(scenario: Scenario) -> Iterator[str]:
 
 def _too_long(scenario: Scenario) -> Iterator[str]:
     """A formation in which packets have more hops to make than they may."""
+    if scenario.mission.search == "none":
+        return
+    from agents.mission.searcher import formation  # other scenarios are checked without UAVs' programs
+
     limit, count = scenario.routing.hop_limit, scenario.nodes.count
-    pattern = None if scenario.mission.search == "none" else formation(scenario, count)
+    pattern = formation(scenario, count)
     if pattern is not None:
         tied = {place: pattern.tethers(place, 0.0) for place in range(pattern.places)}
         hops = max(max(levels(tied, place).values()) for place in tied)

@@ -34,7 +34,7 @@ class HelloSchedule:
         self._lead_ns = scenario.radio.lead_ns
         self._interval_ns = seconds_to_ns(scenario.routing.hello_interval_s)
         self._lifetime_ns = neighbor_lifetime_ns(scenario.routing.hello_interval_s)
-        self._protocol = f"routing.protocol = {scenario.routing.protocol!r}"
+        self._protocol = scenario.routing.said
         self._random = stream(scenario.seed, "hello", node.node).random
         self._next_ns: int | None = None
         self._heard_ns: dict[NodeId, int] = {}

@@ -9,27 +9,30 @@ The last command of each application counts, and no other application may object
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from random import Random
 from typing import Any, Final
 
-from agents.application_check import require_application, said
 from agents.listeners import Callbacks, Listeners
 from agents.messenger import Messenger
-from agents.submission import Sending, Submission, positive, priority_of, require_frames
+from agents.submission import MOST_PORT, Sending, Submission, is_port, positive, priority_of, require_frames
 from fanet_mw import wire
 from fanet_mw.actor import require_instant
-from fanet_mw.application import Application, Course, Destination, Received
+from fanet_mw.application import ANY, Application, Course, Destination, Fate, Received
 from fanet_mw.bus.messages import Gps, SensorReading
 from fanet_mw.errors import DropReason, LocalProtocolError, MalformedFrameError
 from fanet_mw.node.node import Node
 from fanet_mw.node.packet import Packet
 from fanet_mw.part_failure import is_ours, report_of
+from fanet_mw.part_signature import misfit
 from fanet_mw.rng import stream
 from fanet_mw.scenario import Scenario
 from fanet_mw.trace import Record, require_record
 from fanet_mw.units import BROADCAST, US, Enu, NodeId
 
+_MOST_MESSAGE_ID: Final = (1 << 24) - 1
+"""MAVLink 2: ids have three bytes."""
+_LONGEST_NAME: Final = 64
 _OF_MESSENGER: Final = {
     wire.MESSAGE.msgid: lambda messenger: messenger.piece,
     wire.TARGETS.msgid: lambda messenger: messenger.piece,
@@ -52,7 +55,7 @@ class Onboard:
     ) -> None:
         """`vehicle` gives position and velocity; `fly` and `tap` take a course or frames, and an instant."""
         for application in applications:
-            require_application(application)
+            _require_application(application)
         names = [application.name for application in applications]
         if len(set(names)) < len(names):
             raise LocalProtocolError(f"applications {names} of node {node.node}: each name must be there once")
@@ -160,7 +163,7 @@ class Onboard:
         for application in self._callbacks.hello_frames:
             frames = application.hello_frames(now_ns)
             if not is_ours(application) and frames != b"":
-                require_frames(frames, most=room - len(added), who=f"{said(application)}: hello_frames()")
+                require_frames(frames, most=room - len(added), who=f"{_said(application)}: hello_frames()")
             added += frames
         return added
 
@@ -182,7 +185,7 @@ class Onboard:
         for timed in self._callbacks.next_wake_ns:
             wake_ns = timed.next_wake_ns()
             if wake_ns is not None and wake_ns.__class__ is not int:  # NaN would be lost among the others
-                require_instant(wake_ns, who=f"{said(timed)} of node {self.node.node}")
+                require_instant(wake_ns, who=f"{_said(timed)} of node {self.node.node}")
             if wake_ns is not None and (first_ns is None or wake_ns < first_ns):
                 first_ns = wake_ns
         return first_ns
@@ -190,7 +193,7 @@ class Onboard:
     def due(self, now_ns: int) -> list[str]:
         """The applications that want to be woken by now, by name."""
         asked = [(timed, timed.next_wake_ns()) for timed in self._callbacks.next_wake_ns]
-        return [said(timed) for timed, wake_ns in asked if wake_ns is not None and wake_ns <= now_ns]
+        return [_said(timed) for timed, wake_ns in asked if wake_ns is not None and wake_ns <= now_ns]
 
     # --- output ---------------------------------------------------------------------------------------------------
 
@@ -272,18 +275,18 @@ class _ApplicationPort:
     def fly(self, course: Course) -> None:
         if not isinstance(course, Course) or not _is_flyable(course):
             raise LocalProtocolError(
-                f"{said(self._application)}: course = {course!r} must be a Course of finite numbers"
+                f"{_said(self._application)}: course = {course!r} must be a Course of finite numbers"
             )
         self._onboard.command(self._application, course)
 
     def record(self, record: Record) -> None:
         if not is_ours(self._application):
-            require_record(record, who=said(self._application))
+            require_record(record, who=_said(self._application))
         self._onboard.record(self._application, record)
 
     def tap(self, frames: bytes) -> None:
         if not is_ours(self._application):
-            require_frames(frames, who=f"{said(self._application)}: tap()")
+            require_frames(frames, who=f"{_said(self._application)}: tap()")
         self._onboard.tap(frames, self._onboard.now_ns)
 
     def stream(self, use: str) -> Random:
@@ -298,3 +301,40 @@ def _is_flyable(course: Course) -> bool:
         return all(map(math.isfinite, (*places[0], *places[-1], course.speed_m_s)))
     except TypeError:
         return False
+
+
+def _said(application: Application) -> str:
+    """How an application is named in an error."""
+    return f"application {application.name!r} ({type(application).__module__}:{type(application).__qualname__})"
+
+
+def _require_application(application: Application) -> None:
+    """Raise LocalProtocolError for attributes that mean nothing, and methods that cannot be called."""
+    name = application.name
+    if not isinstance(name, str) or not (0 < len(name) <= _LONGEST_NAME and name.isprintable()):
+        raise LocalProtocolError(
+            f"{_said(application)}: name must be text of 1 to {_LONGEST_NAME} printable characters"
+        )
+    if (wrong := misfit(type(application), Application)) is not None:  # type: ignore[arg-type]  # a class is hashable
+        raise LocalProtocolError(f"{_said(application)} {wrong}")
+    _require_collection(
+        application, "ports", all(map(is_port, _members(application.ports))), f"numbers in [1, {MOST_PORT}]"
+    )
+    known = all(type(i) is int and 0 <= i <= _MOST_MESSAGE_ID for i in _members(application.listens))
+    _require_collection(application, "listens", known, f"ids of messages in [0, {_MOST_MESSAGE_ID}]")
+    _require_collection(
+        application, "follows", all(fate in list(Fate) for fate in _members(application.follows)), "fates"
+    )
+
+
+def _members(told: object) -> Collection[object]:
+    """The members of a collection; what is none has a member that nothing allows."""
+    if told == ANY:
+        return ()
+    return told if isinstance(told, Collection) and not isinstance(told, str | bytes) else (None,)
+
+
+def _require_collection(application: Application, attribute: str, known: bool, what: str) -> None:
+    if not known:
+        value = getattr(application, attribute)
+        raise LocalProtocolError(f"{_said(application)}: {attribute} = {value!r:.120} must be a collection of {what}")

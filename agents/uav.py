@@ -232,7 +232,7 @@ class Uav(Actor):
 
     def due(self, now_ns: int) -> list[str]:
         node_ns = self._node.next_wake_ns()
-        protocol = f"routing.protocol = {self._node.scenario.routing.protocol!r}"
+        protocol = self._node.scenario.routing.said
         return [*self._onboard.due(now_ns), *([protocol] if node_ns is not None and node_ns <= now_ns else [])]
 
     def state(self, now_ns: int) -> NodeState:

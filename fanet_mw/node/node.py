@@ -9,6 +9,7 @@ the routing protocol behind it decides what happens next, and sends through the 
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from itertools import zip_longest
+from random import Random
 from typing import Final, NamedTuple
 
 from fanet_mw import wire
@@ -16,7 +17,6 @@ from fanet_mw.bus.messages import Reception, TxStatus
 from fanet_mw.errors import DropReason, LocalProtocolError, MalformedFrameError
 from fanet_mw.node.contract import Port, RoutingProtocol
 from fanet_mw.node.duplicates import DELIVERED, DuplicateSet, key_of
-from fanet_mw.node.event_jitter import EventJitter
 from fanet_mw.node.header_check import HeaderCheck
 from fanet_mw.node.neighbors import Silences
 from fanet_mw.node.packet import Packet, Relay
@@ -89,7 +89,7 @@ class Node:
         """The transmissions that the actor is to take to the radio."""
         self.watch = self.port.watch
         """What becomes of the own packets that an application wants to know of."""
-        self._event_jitter = EventJitter(self.port.stream("event_jitter"), most_ns=scenario.routing.jitter_ns)
+        self._event_jitter = _EventJitter(self.port.stream("event_jitter"), most_ns=scenario.routing.jitter_ns)
         protocol = self._protocol = make_protocol(self.port)
         self.next_wake_ns = protocol.next_wake_ns
         """The protocol's own method, because every wake-up is followed by this question."""
@@ -204,8 +204,8 @@ class Node:
         if not isinstance(added, bytes) or len(added) > most - len(inner):
             told = f"{len(added)} bytes" if isinstance(added, bytes) else f"{added!r:.80}"
             raise LocalProtocolError(
-                f"routing.protocol = {self.scenario.routing.protocol!r}: hello_inner({most - len(inner)}) must give at "
-                f"most so many bytes, not {told}"
+                f"{self.scenario.routing.said}: hello_inner({most - len(inner)}) must give at most so many bytes, not "
+                f"{told}"
             )
         inner += added
         if time is not None and len(inner) + len(time) <= most:
@@ -336,3 +336,21 @@ class Node:
     def _drops(self) -> dict[str, int]:
         dropped = self.port.dropped + Counter({DropReason.DUPLICATE: self._copies})
         return {reason: dropped[reason] for reason in sorted(dropped)}
+
+
+class _EventJitter:
+    """By how much later own packets start that several nodes may send on the same event (RFC 5148, 5.2): U(0, most),
+    the same for all of one instant. Both UAVs of a conflict foresee it at the same fix, all who hear a packet may
+    answer it, and on an idle channel frames that begin at one instant collide with certainty.
+    """
+
+    def __init__(self, random: Random, *, most_ns: int) -> None:
+        self._random = random
+        self._most_ns = most_ns
+        self._drawn = -1, 0
+        """The last instant, and its jitter."""
+
+    def ns(self, now_ns: int) -> int:
+        if self._drawn[0] != now_ns:
+            self._drawn = now_ns, int(self._random.random() * self._most_ns)
+        return self._drawn[1]

@@ -84,7 +84,7 @@ class NodePort:
         try:
             packet, start_ns = relay
         except (TypeError, ValueError):
-            said = f"routing.protocol = {self.scenario.routing.protocol!r}"
+            said = self.scenario.routing.said
             raise LocalProtocolError(f"{said}: receive() must give relays, not {relay!r:.80}") from None
         self.transmit(self._relayed(packet), BROADCAST, start_ns)
 
@@ -134,7 +134,7 @@ class NodePort:
 
     def _require_request(self, frame: object, start_ns: object, until_ns: object) -> None:
         """Raise for what no radio can be asked, which would surface in another actor."""
-        said = f"routing.protocol = {self.scenario.routing.protocol!r} transmits"
+        said = f"{self.scenario.routing.said} transmits"
         if not isinstance(frame, bytes):
             raise LocalProtocolError(f"{said} {frame!r:.80}, which must be bytes")
         for name, instant in (("start_ns", start_ns), ("until_ns", until_ns)):
@@ -168,7 +168,7 @@ class NodePort:
 
     def record(self, record: Record) -> None:
         if type(record) not in RECORDS:
-            require_record(record, who=f"routing.protocol = {self.scenario.routing.protocol!r}")
+            require_record(record, who=self.scenario.routing.said)
         self.records.append(record)
 
     def stream(self, use: str) -> Random:

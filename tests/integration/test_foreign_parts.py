@@ -178,6 +178,16 @@ def test_what_a_part_computes_is_checked_where_it_enters(
     assert "\n" not in str(caught.value)
 
 
+def named_by(key: str, name: str, *, source: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """The change of a scenario that names a part, whose module is written anew and has not been imported."""
+    module, _, _ = name.partition(":")
+    (folder / f"{module}.py").write_text(source)
+    monkeypatch.syspath_prepend(folder)
+    monkeypatch.delitem(sys.modules, module, raising=False)
+    extensions.load.cache_clear()
+    return f"applications=[{{use='{name}'}}]" if key == "applications.use" else f"{key}={name}"
+
+
 UNMADE = """
 import sys
 from fanet_mw.application import Application
@@ -227,11 +237,7 @@ class Finder(Application):
 def test_a_part_that_cannot_be_made_is_named_with_its_class_and_what_is_wrong(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, key: str, name: str, said: str
 ) -> None:
-    (tmp_path / "parts.py").write_text(UNMADE)
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.delitem(sys.modules, "parts", raising=False)
-    extensions.load.cache_clear()
-    change = f"applications=[{{use='{name}'}}]" if key == "applications.use" else f"{key}={name}"
+    change = named_by(key, name, source=UNMADE, folder=tmp_path, monkeypatch=monkeypatch)
     scenario = catalog.find("quick", ["duration_s=3", "warmup_s=0", "drain_s=1", "mission.survivors=0", change])
     with pytest.raises(ConfigError) as caught:
         simulate(scenario)
@@ -380,12 +386,8 @@ class Cells:
 def test_a_method_that_cannot_be_called_as_its_contract_calls_it_is_named_when_the_scenario_is_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, key: str, name: str, said: str
 ) -> None:
-    (tmp_path / "misfits.py").write_text(MISFITS)
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.delitem(sys.modules, "misfits", raising=False)
-    extensions.load.cache_clear()
     part = f"misfits:{name}"
-    change = f"applications=[{{use='{part}'}}]" if key == "applications.use" else f"{key}={part}"
+    change = named_by(key, part, source=MISFITS, folder=tmp_path, monkeypatch=monkeypatch)
     if not said:
         catalog.find("quick", [change])
         return

@@ -7,7 +7,7 @@ the detours of all, and ties keep it in reach of the others (`agents/mission/fli
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Final
 
@@ -41,31 +41,38 @@ def detours(pattern: Pattern, starts: Mapping[int, Enu], *, view_m: float, most_
     unseen = {(column, row) for column in columns for row in rows}
     for place, start in starts.items():
         unseen.difference_update(_shown(start, goals[place], view_m))
-    unseen.difference_update(_swept(pattern, view_m))
+    if unseen:
+        unseen.difference_update(_swept(pattern, view_m))
     straight_m = {place: start.horizontal_to(goals[place]) for place, start in starts.items()}
     shows = {cell: sum(other in unseen for other in _near(cell, view_m)) for cell in unseen}
     found: dict[int, Enu] = {}
     while shows:
         cell = max(shows, key=lambda cell: (shows[cell], cell))
         del shows[cell]
-        over, best = _at(cell), (math.inf, -1)
-        for place, way_m in straight_m.items():
-            longer_m = starts[place].horizontal_to(over) + over.horizontal_to(goals[place]) - way_m
-            if longer_m <= min(_LONGEST_M, most_m - way_m):
-                best = min(best, (longer_m, place))
-        place = best[1]
-        if place < 0:
-            continue
-        del straight_m[place]
-        found[place] = over._replace(up=goals[place].up)
-        for a, b in pairwise((starts[place], over, goals[place])):
-            for shown in unseen.intersection(_shown(a, b, view_m)):
-                unseen.discard(shown)
-                shows.pop(shown, None)
-                for other in _near(shown, view_m):
-                    if other in shows:
-                        shows[other] -= 1
+        over = _at(cell)
+        longer = [
+            (longer_m, place)
+            for place, way_m in straight_m.items()
+            if (longer_m := starts[place].horizontal_to(over) + over.horizontal_to(goals[place]) - way_m)
+            <= min(_LONGEST_M, most_m - way_m)
+        ]
+        if longer:
+            _, place = min(longer)
+            del straight_m[place]
+            found[place] = over._replace(up=goals[place].up)
+            for a, b in pairwise((starts[place], over, goals[place])):
+                _show(unseen.intersection(_shown(a, b, view_m)), unseen, shows, view_m)
     return found
+
+
+def _show(shown: Iterable[_Cell], unseen: set[_Cell], shows: dict[_Cell, int], view_m: float) -> None:
+    """Take cells out of those that are `unseen`, and of the number of such cells that a camera `shows` above others."""
+    for cell in shown:
+        unseen.discard(cell)
+        shows.pop(cell, None)
+        for other in _near(cell, view_m):
+            if other in shows:
+                shows[other] -= 1
 
 
 def _cell(at: Enu) -> _Cell:

@@ -67,6 +67,11 @@ class Routing(Section):
     """`counter`: copies are counted for U(0, assess_ms)."""
 
     @property
+    def said(self) -> str:
+        """The protocol as errors name it."""
+        return f"routing.protocol = {self.protocol!r}"
+
+    @property
     def jitter_ns(self) -> int:
         return round(self.jitter_ms * MS)
 

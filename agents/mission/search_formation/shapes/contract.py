@@ -262,7 +262,7 @@ class Shape(Protocol):
         return self
 
     def begun_around(self, swarm: Swarm) -> tuple[Dimensions, ...]:
-        """Dimensions of the shape begun where a swarm stands, the largest first; none if it begins as it is."""
+        """Dimensions of the shape begun where a swarm stands, the fastest first; none if it begins as it is."""
         return ()
 
     def apart_m(self, team: int, east_m: float, north_m: float, swept_s: float) -> float:

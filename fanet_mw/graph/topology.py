@@ -4,6 +4,7 @@
 """
 
 from collections.abc import Collection, Iterable, Mapping
+from functools import lru_cache
 from typing import Final, TypeVar
 
 from fanet_mw.rng import priority_hash
@@ -16,6 +17,8 @@ N = TypeVar("N", bound=int)
 """A node, or a place of a formation."""
 
 _MIN_CELL_M: Final = 1e-3
+_REMEMBERED: Final = 4096
+"""The sets of nodes whose members a process remembers; most are the neighbors of somebody, and asked for again."""
 
 
 def symmetric(heard: Mapping[NodeId, Collection[NodeId]]) -> dict[NodeId, tuple[NodeId, ...]]:
@@ -96,30 +99,73 @@ def components(adjacency: Adjacency) -> list[tuple[NodeId, ...]]:
     return found
 
 
-def dominates(node: NodeId, adjacency: Adjacency) -> bool:
-    """True if `node` decides to belong to the set; `adjacency` needs only the node and its neighbors. It does not if
-    any two of its neighbors (as where all hear each other) are connected directly or over stronger nodes within its two
-    hops (coverage condition I of Wu & Dai, "A generic distributed broadcast scheme in ad hoc wireless networks", ICDCS
-    2003). A hash of the id breaks ties: with plain ids, a swarm numbered row by row has no node with stronger ones all
-    around.
+@lru_cache(maxsize=_REMEMBERED)
+def nodes_of(bits: int) -> tuple[NodeId, ...]:
+    """The nodes of a set, in order: bit i stands for node i + 1."""
+    nodes = []
+    while bits:
+        last = bits & -bits
+        nodes.append(NodeId(last.bit_length()))
+        bits ^= last
+    return tuple(nodes)
+
+
+def bits_of(nodes: Iterable[NodeId]) -> int:
+    """The set of these nodes: bit i stands for node i + 1."""
+    return sum(1 << (node - 1) for node in nodes)
+
+
+def link_sets(adjacency: Adjacency) -> dict[NodeId, int]:
+    """The neighbors of each node as `bits_of` gives them."""
+    return {node: bits_of(neighbors) for node, neighbors in adjacency.items()}
+
+
+def dominates(node: NodeId, links: Mapping[NodeId, int]) -> bool:
+    """True if `node` decides to belong to the set; `links`: `link_sets` of it and of its neighbors.
+
+    It does not if any two of its neighbors are connected directly or over stronger nodes within its two hops (coverage
+    condition I of Wu & Dai, "A generic distributed broadcast scheme in ad hoc wireless networks", ICDCS 2003). A hash
+    of the id breaks ties: with plain ids, a swarm numbered row by row has no node with stronger ones all around.
     """
-    near = {n: frozenset(adjacency[n]) for n in (node, *adjacency[node])}
-    if _complete(adjacency[node], near):
+    ours = links[node]
+    near = nodes_of(ours)
+    later = {a: ours >> a << a for a in near}
+    """For each neighbor, those with greater ids: each pair is looked at once."""
+    if not any(later[a] & ~links[a] for a in near):
         return False
+    known = ours
+    for a in near:
+        known |= links[a]
+    reached = {a: links[a] for a in near}
+    for way in _ways(links, near, known & _stronger_than(node, known.bit_length())):
+        beside = [a for a in near if (links[a] | 1 << (a - 1)) & way]
+        joined = bits_of(beside)
+        for a in beside:
+            reached[a] |= joined
+    return any(later[a] & ~reached[a] for a in near)
+
+
+def _ways(links: Mapping[NodeId, int], near: Iterable[NodeId], stronger: int) -> list[int]:
+    """The connected parts of the stronger nodes, by the links of the near ones."""
+    ways: list[int] = []
+    apart = stronger
+    for a in near:
+        if stronger >> (a - 1) & 1:
+            way = (links[a] | 1 << (a - 1)) & stronger
+            apart &= ~way
+            for other in [other for other in ways if other & way]:
+                ways.remove(other)
+                way |= other
+            ways.append(way)
+    return ways + [1 << (alone - 1) for alone in nodes_of(apart)]
+
+
+@lru_cache(maxsize=_REMEMBERED)
+def _stronger_than(node: NodeId, count: int) -> int:
+    """The nodes, of the first `count` ones, that are stronger than `node`."""
     ours = _strength(node)
-    known = frozenset().union(*near.values()) - {node}
-    stronger = sorted(n for n in known if _strength(n) > ours)
-    links = {n: tuple(m for m in stronger if m in near.get(n, ()) or n in near.get(m, ())) for n in stronger}
-    ways = [frozenset(part) for part in components(links)]
-    over = {n: frozenset(i for i, way in enumerate(ways) if n in way or near[n] & way) for n in adjacency[node]}
-    return not all(
-        b in near[a] or over[a] & over[b] for i, a in enumerate(adjacency[node]) for b in adjacency[node][i + 1 :]
-    )
+    return bits_of(NodeId(n) for n in range(1, count + 1) if _strength(NodeId(n)) > ours)
 
 
 def _strength(node: NodeId) -> tuple[int, NodeId]:
     return priority_hash(node), node
-
-
-def _complete(nodes: tuple[NodeId, ...], near: Mapping[NodeId, frozenset[NodeId]]) -> bool:
-    return all(b in near[a] for i, a in enumerate(nodes) for b in nodes[i + 1 :])

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final, NamedTuple
 
 from agents.applications.traffic import sources_of
-from fanet_mw.graph.topology import Adjacency, dominates, levels, two_hop, within_range
+from fanet_mw.graph.topology import Adjacency, dominates, levels, link_sets, two_hop, within_range
 from fanet_mw.routing.rounds.bulk_slots import SELDOM
 from fanet_mw.routing.rounds.delay_law import DelayLaw
 from fanet_mw.routing.rounds.round_timing import RoundTiming
@@ -133,7 +133,8 @@ def greatest_load(
     adjacency: Adjacency, rates: Mapping[NodeId, float], timing: RoundTiming, *, longest_bytes: int
 ) -> BulkLoad:
     """The node whose slots are fullest. `rates`: packets for all, a second; `longest_bytes`: of a packet on the air."""
-    relays = {node for node in adjacency if dominates(node, adjacency)}
+    links = link_sets(adjacency)
+    relays = {node for node in adjacency if dominates(node, links)}
     slots = timing.slots * (timing.slot_bytes // longest_bytes) * S / timing.period_ns
     total = sum(rates.values())
     loads = []

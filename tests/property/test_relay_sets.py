@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from kit import examples
 
-from fanet_mw.graph.topology import components, dominates, levels, symmetric, within_range
+from fanet_mw.graph.topology import components, dominates, levels, link_sets, symmetric, within_range
 from fanet_mw.rng import stream
 from fanet_mw.routing.olsr.parameters import WILL_ALWAYS, WILL_NEVER
 from fanet_mw.routing.olsr.protocol import multipoint_relays
@@ -100,19 +100,19 @@ def reached(adjacency, source, relays):
 
 @given(graphs())
 def test_a_flood_reaches_everyone_over_those_who_find_that_they_dominate(adjacency) -> None:
-    relays = {n for n in adjacency if dominates(n, two_hops_of(n, adjacency))}
+    relays = {n for n in adjacency if dominates(n, link_sets(two_hops_of(n, adjacency)))}
     for part in components(adjacency):
         for source in part:
             assert reached(adjacency, source, relays) == set(part)
 
 
 def test_of_a_line_all_but_the_ends_find_that_they_dominate_and_of_a_full_mesh_none() -> None:
-    assert [n for n in line(6) if dominates(n, line(6))] == [2, 3, 4, 5]
+    assert [n for n in line(6) if dominates(n, link_sets(line(6)))] == [2, 3, 4, 5]
     mesh = symmetric({NodeId(n): range(1, 6) for n in range(1, 6)})
-    assert not any(dominates(n, mesh) for n in mesh)
+    assert not any(dominates(n, link_sets(mesh)) for n in mesh)
 
 
 def test_in_a_thin_grid_a_third_need_not_relay() -> None:
     places = {NodeId(9 * y + x + 1): Enu(200.0 * x, 200.0 * y, 0) for x in range(9) for y in range(5)}
     grid = within_range(places, range_m=250)
-    assert sum(dominates(n, two_hops_of(n, grid)) for n in grid) <= 31
+    assert sum(dominates(n, link_sets(two_hops_of(n, grid))) for n in grid) <= 31

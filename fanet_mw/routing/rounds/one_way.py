@@ -10,10 +10,11 @@ from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 from fanet_mw.bus.messages import TxOutcome, TxStatus
+from fanet_mw.graph.topology import nodes_of
 from fanet_mw.node.contract import Port
 from fanet_mw.node.packet import Packet
 from fanet_mw.routing.rounds.round_timing import RoundTiming
-from fanet_mw.routing.rounds.topology import Topology, nodes_of
+from fanet_mw.routing.rounds.topology import Topology
 from fanet_mw.units import NodeId
 
 _UNICAST: Final = 0

@@ -614,8 +614,8 @@ class RoundFlooding(RoutingProtocol):
     def wake(self, now_ns: int) -> None:
         self._now_ns = now_ns
         if now_ns >= self._topology.epoch_end_ns:
-            waiting = self._spreading.due_bulk()  # what others are to send must not take the relays' slots
-            self._often = self._topology.dominates() or waiting >= (1 if self._often else _MUCH_BULK)
+            much = 1 if self._often else _MUCH_BULK  # what others are to send must not take the relays' slots
+            self._often = self._topology.dominates() or self._spreading.has_due_bulk(much)
             self._topology.state(self._stayers(now_ns), often=self._often, now_ns=now_ns)
             self._hurry_changes(now_ns)
         self._repair_due(now_ns)

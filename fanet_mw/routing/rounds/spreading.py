@@ -13,12 +13,13 @@ Peng and Lu, MobiHoc 2000). Sets of nodes are integers: bit i stands for node i 
 import math
 from collections import OrderedDict
 from collections.abc import Iterable, Sequence
-from heapq import heappop, heappush
+from heapq import heapify, heappop, heappush
+from itertools import islice
 from typing import Final
 
+from fanet_mw.graph.topology import nodes_of
 from fanet_mw.node.duplicates import key_of, origin_and_seq
 from fanet_mw.node.packet import Packet
-from fanet_mw.routing.rounds.topology import nodes_of
 from fanet_mw.units import US
 
 _MOST_EARLY: Final = 1024
@@ -32,8 +33,12 @@ _OTHER_LINKS: Final = 2
 """A neighbor that is heard of fewer packets than that share is left to others, if it has so many links."""
 _MOST_VAIN: Final = 16
 """So often something is sent again for a neighbor that never shows to have heard anything."""
+_STALE_SHARE: Final = 4
+"""The heap of packets by how they are missed is made anew when it has so many entries for each packet kept."""
 _WAY_ROUND: Final = 2
 """The hops that a flood may need to reach a neighbor by relays that this node does not hear."""
+
+_ByLoss = tuple[int, bool, int, int]
 
 
 def _key(packet: Packet) -> int:
@@ -91,10 +96,10 @@ class _Spread:
         self.in_reach_twice |= self.in_reach & nodes
         self.in_reach |= nodes
 
-    def dispensable(self) -> tuple[int, bool, int]:
-        """The greater is missed less: less urgent, or sent, or of sent ones the older, of others the newer."""
-        priority, origin_us, _ = self.rank
-        return priority, self.sent > 0, -origin_us if self.sent else origin_us
+    def by_loss(self) -> _ByLoss:
+        """The least is missed least: less urgent, or sent, or of sent ones the older, of others the newer."""
+        priority, origin_us, key = self.rank
+        return -priority, not self.sent, origin_us if self.sent else -origin_us, key
 
     @property
     def again(self) -> bool:
@@ -117,6 +122,9 @@ class Spreading:
         self._patience_ns = patience_ns
         self._links = links
         self._entries: dict[int, _Spread] = {}
+        self._by_loss: list[_ByLoss] = []
+        """A heap of all packets, those that are missed least first, from when the first did not fit; outdated entries
+        are skipped."""
         self.urgent: dict[int, _Spread] = {}
         self._waiting: set[int] = set()
         self._hasty: dict[int, _Spread] = {}
@@ -147,10 +155,11 @@ class Spreading:
         """The number of packets that have not been sent yet."""
         return len(self._waiting) + sum(1 for entry in self._bulk.values() if not entry.sent)
 
-    def due_bulk(self) -> int:
-        """Bulk packets, about, that wait for a slot, and that this node sends before others, or again."""
+    def has_due_bulk(self, count: int) -> bool:
+        """True if so many bulk packets, about, wait for a slot that this node sends before others, or again."""
         ready = (self._bulk[key] for _, (_, _, key) in self._ready if key in self._bulk)
-        return sum(1 for entry in ready if entry.sent or not (entry.again or entry.spare))
+        due = (entry for entry in ready if entry.sent or not (entry.again or entry.spare))
+        return next(islice(due, count - 1, None), None) is not None
 
     # --- what is heard --------------------------------------------------------------------------------------------
 
@@ -184,11 +193,23 @@ class Spreading:
             heappush(self._due, (bulk_from_ns, key))
             if src is not None and not entry.again:
                 entry.reached |= entry.senders | self._links[src]
+        if self._by_loss:
+            heappush(self._by_loss, entry.by_loss())
         if len(self._entries) <= self._capacity:
             return None
-        evicted = max(self._entries.values(), key=_Spread.dispensable)
-        self._remove(_key(evicted.packet))
+        evicted = self._evict()
         return None if evicted.sent else evicted.packet
+
+    def _evict(self) -> _Spread:
+        """Forget the packet that is missed least."""
+        if not self._by_loss or len(self._by_loss) > _STALE_SHARE * self._capacity:
+            self._by_loss = [entry.by_loss() for entry in self._entries.values()]
+            heapify(self._by_loss)
+        while (key := heappop(self._by_loss)[-1]) not in self._entries:
+            pass  # of one that was sent since, the entry that says so came first
+        entry = self._entries[key]
+        self._remove(key)
+        return entry
 
     def _remove(self, key: int) -> None:
         del self._entries[key]
@@ -322,6 +343,8 @@ class Spreading:
         self.repeated += entry.sent > 0
         entry.sent += 1
         entry.sent_ns = start_ns
+        if self._by_loss and entry.sent == 1:
+            heappush(self._by_loss, entry.by_loss())
         self._waiting.discard(key)
         self._hasty.pop(key, None)
         return entry.sent

@@ -6,11 +6,11 @@ if both its ends state it.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from functools import lru_cache, reduce
+from functools import reduce
 from operator import or_
 from typing import Final, NamedTuple
 
-from fanet_mw.graph.topology import dominates
+from fanet_mw.graph.topology import dominates, nodes_of
 from fanet_mw.units import NodeId, S
 from fanet_mw.wire.rounds import HeardNodes
 
@@ -21,19 +21,6 @@ _MISSED: Final = 2
 next one goes ahead in a bulk slot, because the one that others still have may expire soon.
 """
 _new: Final = tuple.__new__  # makes a `_Stated` faster, as is done once per statement
-_REMEMBERED: Final = 4096
-"""The sets of nodes whose members a process remembers; most are the neighbors of somebody, and asked for again."""
-
-
-@lru_cache(maxsize=_REMEMBERED)
-def nodes_of(bits: int) -> tuple[NodeId, ...]:
-    """The nodes of a set, in order: bit i stands for node i + 1."""
-    nodes = []
-    while bits:
-        last = bits & -bits
-        nodes.append(NodeId(last.bit_length()))
-        bits ^= last
-    return tuple(nodes)
 
 
 class _Stated(NamedTuple):
@@ -312,7 +299,7 @@ class Topology:
             links = [self.links[node] for node in near]
             if links != self._dominates_for:
                 self._dominates_for = links
-                self._dominates = dominates(self._node, dict(zip(near, map(nodes_of, links), strict=True)))
+                self._dominates = dominates(self._node, dict(zip(near, links, strict=True)))
         return self._dominates
 
     def absent(self, now_ns: int, *, doubt_ns: int) -> Sequence[NodeId] | None:

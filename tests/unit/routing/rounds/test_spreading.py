@@ -1,7 +1,10 @@
 """What one node passes on, as timelines: urgent packets in turns, bulk where a neighbor is not known to have it."""
 
 import math
+import random
 from collections.abc import Iterable, Mapping
+
+import pytest
 
 from fanet_mw import wire
 from fanet_mw.node.duplicates import key_of, key_of_packet
@@ -11,6 +14,7 @@ from fanet_mw.units import BROADCAST, MS, NodeId, S
 from fanet_mw.wire import Header, Kind
 
 ROUND = 100 * MS
+CAPACITY = 8
 NEAR = {2: (1, 5), 3: (1,)}
 """The neighbors of this node (1), and whom they hear."""
 
@@ -29,7 +33,7 @@ def packet(seq: int, *, priority: int = wire.PRIORITY_REPORT, origin_us: int = 0
 
 def spreading(*, repeats: int = 3, lossy: bool = False, near: Mapping[int, Iterable[int]] = NEAR) -> Spreading:
     links = [nodes({1: near.keys() - {1}, **near}.get(node, ())) for node in range(9)]
-    return Spreading(NodeId(1), capacity=8, repeats=repeats, patience_ns=ROUND, links=links, lossy=lossy)
+    return Spreading(NodeId(1), capacity=CAPACITY, repeats=repeats, patience_ns=ROUND, links=links, lossy=lossy)
 
 
 def sent_in_turn(made: Spreading, turn: int, *, neighbors: tuple[int, ...] = (2, 3)) -> list[int]:
@@ -200,7 +204,8 @@ def test_what_others_send_first_asks_for_no_more_slots() -> None:
     first = made.next_bulk(nodes((2, 3)), start_ns=3 * ROUND)
     assert first is not None
     assert first.header.seq == 2
-    assert made.due_bulk() == 2, "3, and 1, which is sent again; others send 4 first"
+    assert made.has_due_bulk(2), "3, and 1, which is sent again"
+    assert not made.has_due_bulk(3), "others send 4 first"
     made.look_again(first, from_ns=3 * ROUND)
     assert bulk_sent(made, 3 * ROUND) == [2, 3, 4, 1]
 
@@ -293,6 +298,32 @@ def test_bulk_that_was_sent_is_evicted_before_bulk_that_was_not() -> None:
     assert made.push(bulk(9), src=None, now_ns=1, bulk_from_ns=1) is None
     assert key_of_packet(bulk(0)) not in made
     assert key_of_packet(bulk(7)) in made
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_of_all_packets_the_one_is_evicted_that_is_missed_least(seed: int) -> None:
+    draw = random.Random(seed)
+    made, kept = spreading(), dict[int, tuple[int, bool, int]]()
+    """`kept`: of each packet its priority, whether it was sent, and its birth; those that came first are first."""
+    for seq in range(300):
+        what, origin_us = draw.choice(("report", "bulk", "send")), draw.randrange(20)
+        if what == "send":
+            wanted = made.wanted(nodes((2, 3)), start_ns=0)
+            for sent in draw.sample(wanted, min(1, len(wanted))):
+                priority, _, birth_us = kept[key_of_packet(sent)]
+                kept[key_of_packet(sent)] = priority, True, birth_us
+                made.sent(sent, start_ns=ROUND)
+            continue
+        priority = wire.PRIORITY_BULK if what == "bulk" else wire.PRIORITY_REPORT
+        new = packet(seq, priority=priority, origin_us=origin_us)
+        kept[key_of_packet(new)] = priority, False, origin_us
+        least = max(kept, key=lambda key: (kept[key][0], kept[key][1], -kept[key][2] if kept[key][1] else kept[key][2]))
+        evicted = made.push(new, src=None, now_ns=0, bulk_from_ns=0 if what == "bulk" else None)
+        if len(kept) > CAPACITY:
+            _, was_sent, _ = kept.pop(least)
+            assert least not in made
+            assert (evicted is None) == was_sent
+        assert all(key in made for key in kept)
 
 
 def test_what_is_sent_once_is_not_repeated_though_somebody_may_lack_it() -> None:

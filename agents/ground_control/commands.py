@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple
 from agents.applications.telemetry_streams import TelemetryStreams
 from agents.ground_control.pilot import Pilot
 from agents.ground_control.plan_transfer import Peer
-from agents.ground_control.plans import Ground
+from agents.ground_control.plans import LEVEL_SPEEDS, USUAL_SPEED, Ground
 from fanet_mw.flavors import Mode, mode_of
 from fanet_mw.mavlink import common
 from fanet_mw.units import US, Enu, S
@@ -19,6 +19,8 @@ _UNSUPPORTED: Final[int] = common.MAV_RESULT_UNSUPPORTED
 _MOST_US: Final = 1800 * 1_000_000  # MESSAGE_INTERVAL tells them in 31 bits
 _NONE: Final = 0x7FFF_FFFF
 """A latitude or longitude that is not given (INT32_MAX)."""
+_SAME_SPEED: Final = -1
+"""In place of a speed: no change."""
 _CHANGE_MODE: Final = 1
 """MAV_DO_REPOSITION_FLAGS_CHANGE_MODE."""
 _AGAIN_NS: Final = 3 * S
@@ -37,6 +39,11 @@ _QUESTIONS: Final = frozenset({
 def is_question(number: int) -> bool:
     """True for a command that only asks to be told something."""
     return number in _QUESTIONS
+
+
+def _is_whole(number: float, count: int) -> bool:
+    """True for one of 0, 1, ..., count - 1."""
+    return 0 <= number < count and number == int(number)
 
 
 class Command(NamedTuple):
@@ -147,6 +154,8 @@ class Commands:
         place = self._place(command)
         if place is None or not self._pilot.allows(place):
             return _DENIED
+        if not self._pilot.flies:
+            return _LATER
         speed_m_s = command.params[0]
         if speed_m_s > 0 and not self._pilot.change_speed(speed_m_s):
             return _DENIED
@@ -168,16 +177,20 @@ class Commands:
         return None if place is None else place._replace(up=up_m)
 
     def _speed(self, command: Command, _now_ns: int) -> int:
-        speed_m_s = command.params[1]
-        if speed_m_s == -1:
-            return _ACCEPTED  # no change; -2: back to the usual speed
-        known = math.isfinite(speed_m_s) and self._pilot.change_speed(-1.0 if speed_m_s == -2 else speed_m_s)
-        return _ACCEPTED if known else _DENIED
+        kind, speed_m_s = command.params[:2]
+        if kind not in LEVEL_SPEEDS:
+            return _DENIED
+        if speed_m_s == _SAME_SPEED:
+            return _ACCEPTED
+        wanted = None if speed_m_s == USUAL_SPEED else speed_m_s
+        return _ACCEPTED if self._pilot.change_speed(wanted) else _DENIED
 
     def _yaw(self, command: Command, _now_ns: int) -> int:
         degrees, _, turn, relative = command.params
         if not math.isfinite(degrees):
             return _DENIED
+        if self._pilot.on_ground:
+            return _LATER
         way = math.radians(degrees if turn >= 0 else -degrees) if relative else math.radians(degrees)
         self._streams.face((self._streams.yaw or 0.0) + way if relative else way)
         return _ACCEPTED
@@ -190,14 +203,14 @@ class Commands:
     def _set_current(self, command: Command, _now_ns: int) -> int:
         at = command.params[0]
         steps = self._pilot.mission.steps
-        if not (0 <= at < len(steps)) or at != int(at):
+        if not _is_whole(at, len(steps)):
             return _DENIED
         self._pilot.mission.go_to(int(at))
         return _ACCEPTED
 
     def _mode(self, command: Command, now_ns: int) -> int:
         base, main, sub = command.params[:3]
-        if not (0 <= main < 256 and 0 <= sub < 256 and base == base):
+        if not (_is_whole(main, 256) and _is_whole(sub, 256) and base == base):
             return _DENIED
         return self.set_mode(int(main) << 16 | int(sub) << 24, now_ns)
 
@@ -205,7 +218,7 @@ class Commands:
 
     def _set_interval(self, command: Command, now_ns: int) -> int:
         message_id, interval_us = command.params[:2]
-        if not (0 <= message_id < 2**24 and -1 <= interval_us <= _MOST_US):
+        if not (_is_whole(message_id, 2**24) and -1 <= interval_us <= _MOST_US):
             return _DENIED
         if self.paced:
             return _DENIED
@@ -214,7 +227,7 @@ class Commands:
 
     def _get_interval(self, command: Command, _now_ns: int) -> int:
         message_id = command.params[0]
-        if not 0 <= message_id < 2**16:
+        if not _is_whole(message_id, 2**16):
             return _DENIED
         interval_ns = self._streams.interval_ns(int(message_id))
         interval_us = 0 if interval_ns is None else -1 if not interval_ns else interval_ns // US
@@ -223,7 +236,7 @@ class Commands:
 
     def _request(self, command: Command, now_ns: int) -> int:
         message_id = command.params[0]
-        frame = self._one(int(message_id), now_ns) if 0 <= message_id < 2**24 else None
+        frame = self._one(int(message_id), now_ns) if _is_whole(message_id, 2**24) else None
         if frame is None:
             return _DENIED
         self._send(frame)

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from agents.ground_control.plans import Step
+from agents.ground_control.plans import USUAL_SPEED, Step
 from fanet_mw.mavlink import common
 from fanet_mw.units import Enu, S
 
@@ -93,7 +93,7 @@ class MissionFlight:
 
     def _is_done(self, step: Step, here: Enu, now_ns: int, *, reached_m: float, on_ground: bool) -> bool:
         if step.command == _SPEED:
-            if step.params[1] > 0:
+            if step.params[1] > 0 or step.params[1] == USUAL_SPEED:
                 self.speed_m_s = step.params[1]
             return True
         if step.command == _JUMP:

@@ -10,7 +10,7 @@ from typing import Final
 
 from agents.ground_control import settings as names
 from agents.ground_control.mission_flight import LAND, TAKEOFF, MissionFlight
-from agents.ground_control.plans import Area, Step, allowed
+from agents.ground_control.plans import USUAL_SPEED, Area, Step, allowed
 from agents.ground_control.settings import Settings
 from fanet_mw.application import HOME, Course
 from fanet_mw.flavors import Mode
@@ -88,6 +88,10 @@ class Pilot:
         return self._commanded and not (self.mode is Mode.MISSION and self.mission.idle and self.has_task)
 
     @property
+    def flies(self) -> bool:
+        return self.armed and not self.on_ground
+
+    @property
     def cruise_m_s(self) -> float:
         return self.settings[names.SPEED] if self.speed_m_s is None else self.speed_m_s
 
@@ -152,7 +156,7 @@ class Pilot:
 
     def go_to(self, place: Enu, *, guided: bool) -> bool:
         """Fly to a place and hold there; the mode is then hold, as PX4's is, or remains guided."""
-        if self.on_ground or not self.armed or not self.allows(place):
+        if not self.flies or not self.allows(place):
             return False
         self._enter(Mode.GUIDED if guided else Mode.HOLD, Course(place, self.cruise_m_s))
         return True
@@ -195,12 +199,12 @@ class Pilot:
         self._fly = Course(self.position, HOME)
         return True
 
-    def change_speed(self, speed_m_s: float) -> bool:
-        """Fly faster or slower until told otherwise; a negative speed is the parameter's again."""
+    def change_speed(self, speed_m_s: float | None) -> bool:
+        """Fly faster or slower until told otherwise; None: as fast as the parameter says, again."""
         known = self.settings.known[self.settings.index(names.SPEED) or 0]
-        if speed_m_s >= 0 and not known.least <= speed_m_s <= known.most:
+        if speed_m_s is not None and not known.least <= speed_m_s <= known.most:
             return False
-        self.speed_m_s = None if speed_m_s < 0 else speed_m_s
+        self.speed_m_s = speed_m_s
         course = self._course
         if course is not None and not (course.land or course.take_off) and course.velocity is None:
             self._course = self._fly = course._replace(speed_m_s=self.cruise_m_s)
@@ -303,7 +307,8 @@ class Pilot:
         wanted = mission.fly(self.position, now_ns, reached_m=reached, on_ground=self.on_ground)
         if mission.speed_m_s is not None:
             known = self.settings.known[self.settings.index(names.SPEED) or 0]
-            self.speed_m_s = max(known.least, min(known.most, mission.speed_m_s))
+            usual = mission.speed_m_s == USUAL_SPEED
+            self.speed_m_s = None if usual else max(known.least, min(known.most, mission.speed_m_s))
             mission.speed_m_s = None
         if mission.returns:
             self._say(_NOTICE, "Mission: returning")

@@ -58,6 +58,10 @@ _IN_POLYGON: Final = common.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
 _OUT_OF_POLYGON: Final = common.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION
 _IN_CIRCLE: Final = common.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION
 _OUT_OF_CIRCLE: Final = common.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION
+LEVEL_SPEEDS: Final = (common.SPEED_TYPE_AIRSPEED, common.SPEED_TYPE_GROUNDSPEED)
+"""The kinds of speed that DO_CHANGE_SPEED may change here; no UAV climbs or sinks at a speed of its own."""
+USUAL_SPEED: Final = -2
+"""In place of a speed: that of the parameter again."""
 _FENCES: Final = frozenset({_IN_POLYGON, _OUT_OF_POLYGON, _IN_CIRCLE, _OUT_OF_CIRCLE})
 
 
@@ -106,6 +110,8 @@ class Step(NamedTuple):
 def step_of(item: Item, ground: Ground) -> Step:
     """What a mission's item asks for; raises RefusedError."""
     if item.command == common.MAV_CMD_DO_JUMP and not math.isfinite(item.params[0]):
+        raise RefusedError(common.MAV_MISSION_INVALID_PARAM1)
+    if item.command == common.MAV_CMD_DO_CHANGE_SPEED and item.params[0] not in LEVEL_SPEEDS:
         raise RefusedError(common.MAV_MISSION_INVALID_PARAM1)
     if item.command in _OTHERS:
         return Step(item.command, None, item.params)

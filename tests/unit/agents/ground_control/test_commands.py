@@ -18,7 +18,7 @@ from fanet_mw.units import STILL, Enu, NodeId, S
 
 ACCEPTED, LATER, DENIED, UNSUPPORTED = 0, 1, 2, 3
 ARM, TAKEOFF, LAND, HOME = 400, 22, 21, 20
-REPOSITION, SPEED, MODE, START, PAUSE = 192, 178, 176, 300, 193
+REPOSITION, SPEED, MODE, START, PAUSE, YAW = 192, 178, 176, 300, 193, 115
 
 
 def test_every_command_is_acknowledged_and_an_unknown_one_is_unsupported() -> None:
@@ -232,6 +232,39 @@ def test_another_speed_counts_on_the_way_and_later_until_it_is_taken_back() -> N
     assert bench.courses[-1].speed_m_s == 10.0
 
 
+@pytest.mark.parametrize(("kind", "speed_m_s"), [(1, -50.0), (1, -1.5), (2, 3.0), (3, 3.0), (math.nan, 3.0)])
+def test_a_negative_speed_and_one_of_climbing_or_sinking_are_denied_and_change_nothing(
+    kind: float, speed_m_s: float
+) -> None:
+    bench = Bench().airborne()
+    bench.command(SPEED, 1, 4.0)
+    assert bench.command(SPEED, kind, speed_m_s) == DENIED
+    go_to(bench, 40, 0, 20)
+    assert bench.courses[-1].speed_m_s == 4.0
+
+
+def test_a_reposition_that_is_not_flown_leaves_speed_and_heading_as_they_were() -> None:
+    bench = Bench()
+    bench.command(ARM, 1)
+    message = common.MAVLink_command_int_message(1, 1, 6, REPOSITION, 0, 0, 3.0, 0, 0, 1.0, *degrees(10, 10), 20)
+    (ack,) = [answer for answer in bench.say(message) if answer.get_type() == "COMMAND_ACK"]
+    assert ack.result == LATER
+    assert bench.streams.yaw is None
+    go_to(bench.airborne(), 40, 0, 20)
+    assert bench.courses[-1].speed_m_s == 10.0
+
+
+def test_who_stands_on_the_ground_does_not_turn() -> None:
+    bench = Bench()
+    assert bench.command(YAW, 90) == LATER
+    assert bench.airborne().command(YAW, 90) == ACCEPTED
+
+
+@pytest.mark.parametrize("number", [511, 510, 512])
+def test_there_is_no_message_between_two_numbers(number: int) -> None:
+    assert Bench().command(number, common.MAVLINK_MSG_ID_ATTITUDE + 0.5, 100_000) == DENIED
+
+
 def test_modes_are_set_by_both_messages() -> None:
     bench = Bench().airborne()
     number = number_of(Mode.GUIDED)
@@ -384,6 +417,18 @@ def test_an_uploaded_mission_is_flown_item_by_item_and_reported() -> None:
     assert bench.position == pytest.approx((0, 0, 0), abs=3.5)
 
 
+def test_a_mission_takes_its_speed_back_by_minus_two() -> None:
+    bench = Bench()
+    first, *others = square()
+    speeds = [(2, SPEED, 0, 0, 0.0, (1.0, speed_m_s, -1.0, 0.0)) for speed_m_s in (4.0, -2.0)]
+    assert upload(bench, [first, speeds[0], others[0], speeds[1], *others[1:]]) == 0
+    bench.command(ARM, 1)
+    bench.command(START)
+    bench.run(60)
+    flown = {round(course.position.north): course.speed_m_s for course in bench.courses if course.position.up == 25.0}
+    assert flown == {0: 4.0, 60: 10.0}
+
+
 def test_a_lost_item_is_asked_for_again() -> None:
     bench = Bench()
     assert upload(bench, square(), lose=2) == 0
@@ -435,6 +480,7 @@ def test_an_upload_that_breaks_off_leaves_the_old_mission() -> None:
         ((6, 16, *degrees(0, 0), math.nan, NONE), common.MAV_MISSION_UNSUPPORTED_FRAME),
         ((2, 177, 0, 0, 0.0, (math.nan, 1, 0, 0)), common.MAV_MISSION_INVALID_PARAM1),
         ((2, 177, 0, 0, 0.0, (math.inf, 1, 0, 0)), common.MAV_MISSION_INVALID_PARAM1),
+        ((2, SPEED, 0, 0, 0.0, (common.SPEED_TYPE_CLIMB_SPEED, 2, 0, 0)), common.MAV_MISSION_INVALID_PARAM1),
     ],
 )
 def test_a_mission_that_cannot_be_flown_is_refused_with_its_reason(item: object, result: int) -> None:

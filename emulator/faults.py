@@ -33,6 +33,7 @@ from fanet_mw.bus.radio_control import (
     Mishap,
     Partition,
     Restore,
+    can_end,
     extent_of,
     kind_of,
     wrong,
@@ -52,7 +53,7 @@ class _FaultInForce(NamedTuple):
 
 
 class Faults:
-    """The faults in force by label, and the agenda of those that begin or end by themselves."""
+    """The faults in force that can end, by label, and the agenda of those that begin or end by themselves."""
 
     def __init__(self, radio: Radio, *, stations: int, uavs: int, planned: Iterable[tuple[int, Control]] = ()) -> None:
         """`uavs`: how many of the stations are UAVs, the first ones; what befalls UAVs befalls no others."""
@@ -100,10 +101,11 @@ class Faults:
         return why
 
     def _begin(self, fault: Fault, now_ns: int) -> None:
-        self._number += 1
-        self._standing[fault.label] = _FaultInForce(fault, self._number)
-        if fault.for_ns:
-            self._push(now_ns + fault.for_ns, None, fault.label, self._number)
+        if can_end(fault):
+            self._number += 1
+            self._standing[fault.label] = _FaultInForce(fault, self._number)
+            if fault.for_ns:
+                self._push(now_ns + fault.for_ns, None, fault.label, self._number)
         self._note(fault, now_ns, active=True)
 
     def _end(self, label: str, now_ns: int) -> None:

@@ -129,6 +129,11 @@ def kind_of(fault: Fault) -> str:
             assert_never(fault)
 
 
+def can_end(fault: Fault) -> bool:
+    """False for what befalls a UAV for good: motors do not start again, and a battery gets no charge back."""
+    return not (isinstance(fault, Mishap) and fault.what in (MishapKind.CRASH, MishapKind.BATTERY))
+
+
 def extent_of(fault: Fault) -> str:
     """Where a partition or a jammed area is, as a word and numbers for the trace: `nodes` on one side, a `line` through
     two points, a `circle` with its middle, radius and noise [dBm]. Empty for other faults.

@@ -74,7 +74,7 @@ def _refused(control: Control) -> str:
     """Why an emulator that is there has recorded nothing of a change."""
     if not isinstance(control, Restore):
         return "refused (see `refused` in its report)"
-    return f"no fault has the label {control.label!r}" if control.label else "no fault is in force"
+    return f"no fault that can end {f'has the label {control.label!r}' if control.label else 'is in force'}"
 
 
 def impossible(control: Control, tree: Mapping[str, Any], swarm: str) -> str | None:

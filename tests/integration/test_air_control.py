@@ -79,8 +79,8 @@ async def test_a_node_is_cut_off_and_restored_by_command(capsys: pytest.CaptureF
     ("control", "why", "refused"),
     [
         (Cut("x", NodeId(99)), "refused", 1),
-        (Restore("nothing"), "no fault has the label 'nothing'", 1),
-        (Restore(""), "no fault is in force", 0),
+        (Restore("nothing"), "no fault that can end has the label 'nothing'", 1),
+        (Restore(""), "no fault that can end is in force", 0),
     ],
 )
 async def test_what_the_emulator_refuses_is_said_and_counted(

@@ -483,3 +483,17 @@ def test_of_two_faults_of_a_link_each_loses_its_share_of_what_the_other_lets_pas
     spared = {(src, dst): share for src, dst, share in links}
     assert spared[0, 1] == pytest.approx(0.8 * 0.5)
     assert spared[1, 0] == 1.0
+
+
+@pytest.mark.parametrize("what", [MishapKind.CRASH, MishapKind.BATTERY])
+@pytest.mark.parametrize(
+    "later", [Restore("node-2"), Restore(""), Mishap("node-2", NodeId(2), MishapKind.GPS_OFF, STILL)]
+)
+def test_what_befalls_a_uav_for_good_is_never_said_to_have_ended(
+    make_scenario: MakeScenario, what: MishapKind, later: Control
+) -> None:
+    air = Air(make_scenario(**{"nodes.count": 3}), [0, 100, 200])
+    control(air, Mishap("node-2", NodeId(2), what, STILL, 5 * MS), later)
+    air.run()
+    told = [(record.kind, record.active) for record in air.medium.records if isinstance(record, RadioFault)]
+    assert told == [(what.name.lower(), True), *([] if isinstance(later, Restore) else [("gps", True)])]

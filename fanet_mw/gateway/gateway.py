@@ -82,15 +82,19 @@ class SwarmFacts(NamedTuple):
     post: NodeId | None
 
 
-def facts_of(bus: Bus, names: Topics) -> SwarmFacts:
-    """What the keeper of the clock says of the swarm; raises BusError without one, ConfigError for too many UAVs."""
+async def facts_of(bus: Bus, names: Topics, over: asyncio.Event) -> SwarmFacts | None:
+    """What the keeper of the clock says of the swarm, None if `over` is set meanwhile; raises BusError without one,
+    ConfigError for too many UAVs.
+    """
     answers: deque[bytes] = deque()
     until_s = time.monotonic() + _ANSWER_S
     while not answers:
         bus.ask(names.scenario, lambda _, payload: answers.append(payload))
         asked_s = time.monotonic()
-        while not answers and time.monotonic() < asked_s + _LOOK_S:
-            time.sleep(0.01)
+        while not answers and time.monotonic() < asked_s + _LOOK_S:  # Zenoh's thread fills it
+            if over.is_set():
+                return None
+            await asyncio.sleep(0.01)
         if time.monotonic() > until_s:
             raise BusError(f"swarm {names.swarm} does not say what it is within {_ANSWER_S:g} s: is there one?")
     try:
@@ -266,7 +270,9 @@ async def serve(
     on_started: Callable[[Any], None] = lambda _: None,
 ) -> None:
     """Run a gateway beside a swarm until it is over; raises BusError when the router is gone."""
-    facts = await asyncio.to_thread(facts_of, bus, names)
+    facts = await facts_of(bus, names, over)
+    if facts is None:
+        return
     gateway = Gateway(bus, names, facts, doors, tell=tell)
     on_started(gateway)
     await gateway.serve(over)

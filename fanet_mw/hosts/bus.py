@@ -12,8 +12,10 @@ import os
 import re
 import socket
 import ssl
+import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import Future
 from ipaddress import ip_address
 from pathlib import Path
 from typing import Any, Final, Protocol, Self
@@ -174,7 +176,7 @@ class Bus:
             waited_s += patience_s
             settings = _config(mode="client", listen=None, connect=endpoint, file=config, patience_s=patience_s)
             try:
-                return cls(zenoh.open(settings), endpoint)
+                return cls(_opened(settings), endpoint)
             except zenoh.ZError as error:
                 if not listens and (listens := _somebody_listens(endpoint)):
                     patience_s = BUSY_PATIENCE_S
@@ -290,6 +292,30 @@ def _clock_outside_certificate(config: Path | None) -> str | None:
             now = time.strftime("%b %d %H:%M:%S %Y GMT", time.gmtime(now_s))
             return f"the clock of this machine says {now}, and its certificates are valid from {since} to {until}"
     return None
+
+
+def _opened(settings: zenoh.Config) -> zenoh.Session:
+    """A session, opened on a thread of its own, because no signal interrupts Zenoh while it waits for a router."""
+    opening: Future[zenoh.Session] = Future()
+
+    def work() -> None:
+        try:
+            session = zenoh.open(settings)
+        except Exception as error:  # noqa: BLE001  (raised where the session is waited for)
+            if opening.set_running_or_notify_cancel():
+                opening.set_exception(error)
+            return
+        if opening.set_running_or_notify_cancel():
+            opening.set_result(session)
+        else:
+            session.close()  # type: ignore[no-untyped-call]  # zenoh's stub lacks it
+
+    threading.Thread(target=work, name="opens a session", daemon=True).start()
+    try:
+        return opening.result()
+    except KeyboardInterrupt:
+        opening.cancel()
+        raise
 
 
 def _somebody_listens(endpoint: str) -> bool:

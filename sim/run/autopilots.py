@@ -34,7 +34,7 @@ async def run(
     """Play the world of a swarm until its time is over or a signal comes; returns the exit code."""
     over = asyncio.Event()
     per_uav(connection, 1, flag="--autopilots")
-    with heeding(lambda _: over.set()), BusFeed(endpoint, swarm, zenoh_config=zenoh_config, name=WORLD) as feed:
+    with BusFeed(endpoint, swarm, zenoh_config=zenoh_config, name=WORLD) as feed, heeding(lambda _: over.set()):
         bus, names, scenario = feed.bus, feed.names, feed.scenario
         listener = ClockListener(bus, names)
         origin = Geodetic(*scenario.world.origin_deg, 0.0)

@@ -21,10 +21,11 @@ async def run(
 ) -> int:
     """Serve ground stations until the swarm is over or a signal comes; returns the exit code."""
     over = asyncio.Event()
-    with heeding(lambda _: over.set()), Bus.join(endpoint, config_of(zenoh_config, GATEWAY)) as bus:
+    with Bus.join(endpoint, config_of(zenoh_config, GATEWAY)) as bus:
         names = Topics(swarm or find_swarm(bus))
         try:
-            await serve(bus, names, doors, tell=tell, over=over)
+            with heeding(lambda _: over.set()):  # the loop stands still above, where a signal must interrupt
+                await serve(bus, names, doors, tell=tell, over=over)
         except BusError as error:
             if _WENT not in str(error):
                 raise

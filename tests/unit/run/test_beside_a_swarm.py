@@ -2,8 +2,11 @@
 
 import asyncio
 import signal
+import socket
+import subprocess
+import sys
 from collections.abc import Callable, Coroutine
-from typing import Any
+from typing import Any, Self
 
 import pytest
 
@@ -20,6 +23,18 @@ COMMANDS: dict[str, Callable[[], Coroutine[Any, Any, int]]] = {
 }
 
 
+class Joined:
+    """A router, and a swarm that is over as soon as it is listened to."""
+
+    bus = names = scenario = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_command_that_is_over_leaves_the_signals_to_others(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     heard: list[signal.Handlers | int | Callable[..., Any] | None] = []
@@ -34,7 +49,25 @@ def test_a_command_that_is_over_leaves_the_signals_to_others(name: str, monkeypa
         return [asyncio.get_running_loop().remove_signal_handler(each) for each in (signal.SIGINT, signal.SIGTERM)]
 
     before = signal.getsignal(signal.SIGTERM)
-    monkeypatch.setattr(autopilots, "BusFeed", fail)
-    monkeypatch.setattr(gateway.Bus, "join", fail)
+    monkeypatch.setattr(autopilots, "BusFeed", lambda *_, **__: Joined())
+    monkeypatch.setattr(autopilots, "ClockListener", fail)
+    monkeypatch.setattr(gateway.Bus, "join", lambda *_, **__: Joined())
+    monkeypatch.setattr(gateway, "find_swarm", lambda _: "small")
+    monkeypatch.setattr(gateway, "serve", fail)
     assert asyncio.run(run()) == [False, False]
     assert heard != [before], "it heeds them while it runs"
+
+
+@pytest.mark.parametrize("words", [["gateway"], ["autopilots", "udpin:127.0.0.1:14999+"]], ids=lambda words: words[0])
+def test_a_command_that_waits_for_a_router_which_does_not_answer_ends_at_once_when_interrupted(
+    words: list[str],
+) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as router:
+        endpoint = f"tcp/127.0.0.1:{router.getsockname()[1]}"
+        command = [sys.executable, "-m", "fanet_mw", *words, "--connect", endpoint, "--swarm", "small"]
+        with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+            router.settimeout(60)
+            router.accept()[0].close()
+            process.send_signal(signal.SIGINT)
+            assert process.communicate(timeout=8) == (None, "")
+            assert process.returncode == 128 + signal.SIGINT

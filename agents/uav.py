@@ -226,6 +226,10 @@ class Uav(Actor):
         self._onboard.wake(now_ns)
         self._settle(now_ns)
 
+    def stop(self, now_ns: int) -> None:
+        """Hand over what a part has transmitted in the call in which it raised: it is counted as sent."""
+        self._hand_requests()
+
     def next_wake_ns(self) -> int | None:
         own_ns, node_ns = self._own_wake_ns, self._node.next_wake_ns()
         return own_ns if node_ns is None or (own_ns is not None and own_ns < node_ns) else node_ns
@@ -290,11 +294,14 @@ class Uav(Actor):
             onboard.called = False
             self._own_wake_ns = self._next_own_ns()
         if node.requests:
-            outbox, topic = self.outbox, self._tx_topic
-            for request in node.requests:  # mostly there is one
-                outbox.append((topic, request))
-            node.requests.clear()
+            self._hand_requests()
         return called
+
+    def _hand_requests(self) -> None:
+        outbox, topic, requests = self.outbox, self._tx_topic, self._node.requests
+        for request in requests:  # mostly there is one
+            outbox.append((topic, request))
+        requests.clear()
 
     def _next_own_ns(self) -> int | None:
         return earliest(self._onboard.next_wake_ns(), self._hellos.due_ns())

@@ -291,6 +291,12 @@ class Proto(Flooding):
     def receive(self, packet, reception, *, now_ns):
         assert now_ns < 2_600_000_000, "what\\nis this"
         super().receive(packet, reception, now_ns=now_ns)
+class Sender(Flooding):
+    def receive(self, packet, reception, *, now_ns):
+        for dst in (1, 2) if now_ns > 2_600_000_000 else ():
+            self._port.transmit(packet.frame, dst, now_ns + 9_000_000)
+        assert now_ns <= 2_600_000_000, "after it has sent"
+        super().receive(packet, reception, now_ns=now_ns)
 class Course(Static):
     def track(self, t_s): return super().track(t_s) if t_s < 2.6 else 1 / 0
 """
@@ -312,6 +318,7 @@ class Course(Static):
             "raising:Finder.wake (agent-3, at 2.6 s) has raised ValueE",
         ),
         ("routing.protocol=raising:Proto", " s) has raised AssertionError: what is this"),
+        ("routing.protocol=raising:Sender", " s) has raised AssertionError: after it has sent"),
         ("mobility.model=raising:Course", "raising:Course.track (world, at 2.7 s) has raised ZeroDivisionError: div"),
     ],
 )
@@ -332,6 +339,7 @@ def test_what_was_flown_until_a_part_raises_is_kept_and_said_to_have_been_ended_
     assert said in why
     assert 2 < summary["simulated_s"] < 9
     assert summary["frames"]["delivered"] > 5
+    assert summary["frames"]["closes"], summary["frames"]
     assert (tmp_path / "out" / "trace.jsonl").stat().st_size > 1000
     assert all(path.stat().st_mode & 0o600 == 0o600 for path in (tmp_path / "out").iterdir()), "they can be read"
 

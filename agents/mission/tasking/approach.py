@@ -15,7 +15,7 @@ from agents.mission.finding.phone_localization import Estimate, PhoneFilter
 from agents.mission.navigation.neighbor_motions import NeighborMotions
 from agents.mission.navigation.own_motion import OwnMotion
 from agents.mission.outbox import Outbox
-from agents.mission.tasking.look_around import LookAround
+from agents.mission.tasking.look_around import Headway, LookAround
 from fanet_mw.trace import Arrived
 from fanet_mw.units import GOLDEN_ANGLE, NodeId, S
 
@@ -56,6 +56,7 @@ class Approach:
         self._arrival_m = arrival_m
         self._along_m_s = _SPEED_SHARE * speed_m_s
         self._look_around = LookAround(looked_at)
+        self._headway = Headway()
         self._others: Collection[int] = ()
         self.arrived_ns: dict[int, int] = {}
 
@@ -78,10 +79,12 @@ class Approach:
             if responding and place.is_vague and away_m < _MEASURED_M:
                 phone = self._survivors.by_id[survivor].filter
                 return self._place_to_look_at(survivor, phone, now_ns) or (place.east_m, place.north_m)
-            if away_m > self._arrival_m:
-                return place.east_m, place.north_m
-            arrived_ns = self.arrived_ns[survivor] = now_ns
-            if responding:
+            there, here = (place.east_m, place.north_m), self._own_motion.position
+            held_back = responding and self._headway.is_held_back(there, here, now_ns)
+            if away_m > self._arrival_m and not held_back:
+                return there
+            arrived_ns = self.arrived_ns[survivor] = now_ns  # or it is as near as a building, or the swarm, permits
+            if responding and away_m <= self._arrival_m:
                 self._outbox.records.append(Arrived(now_ns, self._node, survivor))
         phone = self._survivors.by_id[survivor].filter
         seen = phone.is_seen

@@ -64,3 +64,27 @@ def test_a_responder_leaves_places_to_another_responder_and_not_to_a_passer_by()
     assert looks_at(beside, []) == alone
     shared = looks_at(beside, [Bid(1, 3, 10, 1, 0)])
     assert math.dist(shared, alone) > math.hypot(*alone)
+
+
+def test_a_responder_that_a_building_or_the_swarm_keeps_from_the_place_looks_around_where_it_is() -> None:
+    board = Board(FOLLOWER, Enu(0, -80, UP_M))
+    board.hear(1, Enu(0, 0, 0), range(1, 5), now_ns=0)
+    place = board.survivors.by_id[1].place()
+    assert place is not None
+    straight = place.east_m, place.north_m
+    assert [board.approach.next_point(1, place, t * S, responding=True) for t in range(3)] == [straight] * 3
+    assert board.approach.next_point(1, place, 3 * S, responding=True) != straight
+    assert not board.out.records, "it has not arrived"
+
+
+def test_a_passer_by_that_stands_goes_on_to_the_place_and_so_does_a_responder_that_gets_on() -> None:
+    passing, flying = Board(FOLLOWER, Enu(0, -80, UP_M)), Board(FOLLOWER, Enu(0, -80, UP_M))
+    for board in (passing, flying):
+        board.hear(1, Enu(0, 0, 0), range(1, 5), now_ns=0)
+    place = passing.survivors.by_id[1].place()
+    assert place is not None
+    for second in range(5):
+        flying.own_motion.fix(Enu(0, -80 + 8 * second, UP_M), STILL, now_ns=second * S)
+        for board, responding in ((passing, False), (flying, True)):
+            point = board.approach.next_point(1, place, second * S, responding=responding)
+            assert point == (place.east_m, place.north_m)

@@ -6,7 +6,7 @@ from search_board import MODEL, UP_M
 
 from agents.mission.finding.looked_at import LookedAt
 from agents.mission.finding.phone_localization import REFERENCE_LOSS_DB, PhoneFilter
-from agents.mission.tasking.look_around import LookAround
+from agents.mission.tasking.look_around import Headway, LookAround
 from fanet_mw.units import Enu, S
 
 LOOK_M = 36.0
@@ -70,3 +70,38 @@ def test_each_of_two_uavs_takes_the_places_nearer_to_it_where_neither_has_looked
         for second in range(3):
             looked_at.note(here, (step * 4 + second) * S)
             looked_at.note(other, (step * 4 + second) * S)
+
+
+def test_who_is_held_back_looks_on_the_other_side_meanwhile_and_on_that_side_again_later() -> None:
+    here, start = Enu(0, 0, UP_M), Enu(0, 0, UP_M)
+    phone, looked_at = heard_once(Enu(80, 0, 0), start), LookedAt(VIEW_M, height_m=UP_M)
+    look = LookAround(looked_at)
+    looked_at.note(here, 0)
+    towards = look.next_place(1, phone, here, 0)
+    assert towards is not None
+    for second in range(1, 5):
+        chosen = look.next_place(1, phone, here, second * S)
+    assert chosen is not None
+    assert chosen[0] * towards[0] + chosen[1] * towards[1] < 0.5 * math.hypot(*chosen) * math.hypot(*towards) + 1e-6
+    moved = Enu(here.east + chosen[0] / 4, here.north + chosen[1] / 4, UP_M)
+    assert look.next_place(1, phone, moved, 12 * S) != towards
+    assert look.next_place(1, phone, here, 40 * S) == towards
+
+
+def test_who_turns_is_not_held_back() -> None:
+    phone, looked_at, here = (
+        heard_once(Enu(80, 0, 0), Enu(0, 0, UP_M)),
+        LookedAt(VIEW_M, height_m=UP_M),
+        Enu(0, 0, UP_M),
+    )
+    look = LookAround(looked_at)
+    looked_at.note(here, 0)
+    towards = look.next_place(1, phone, here, 0)
+    assert look.next_place(1, phone, here, S) == towards
+    assert look.next_place(1, phone, here, 2 * S) == towards
+
+
+def test_who_wants_to_another_point_is_held_back_only_after_it_has_stood_as_long_again() -> None:
+    headway, here = Headway(), Enu(0, 0, UP_M)
+    held = [headway.is_held_back((100.0 if second < 3 else -100.0, 0.0), here, second * S) for second in range(7)]
+    assert held == [False] * 6 + [True]

@@ -74,6 +74,7 @@ _AS_SHIPPED: Final = ("hills", "night", "rescue-base", "convoy", "crossing", "to
 WHOLE: Final[Mapping[str, Case]] = {
     "`rescue`, no leads": Case("rescue", _NO_LEADS, tuple(range(12, 32))),
     **{f"`{name}`": Case(name, (), _FIVE) for name in _AS_SHIPPED},
+    "`town`": Case("town", (), tuple(range(1, 21))),
     "`town`, in lines": _TOWN,
 }
 """Missions as they are shipped, which cost minutes of CPU each."""

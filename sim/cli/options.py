@@ -173,7 +173,7 @@ class OutputFlags:
         require_file_or_nothing(path)
         with writing(f"--record {path}"):
             path.parent.mkdir(parents=True, exist_ok=True)
-            opened_alone(path, emptied=False).close()
+            opened_alone(path).close()
 
     def capture_path(self) -> Path | None:
         from emulator.pcap_file import NAME

@@ -6,6 +6,7 @@ What is on which topic is in docs/how-to/recordings.md. Instants are unix time: 
 import contextlib
 import json
 import math
+import os
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -88,7 +89,9 @@ _Metrics, _UavState, _Links, _Report = _messages()
 
 
 class McapRecording(Observer):
-    """A recording that is being written; a context manager, which closes the file."""
+    """A recording that is being written; a context manager, which closes the file. An earlier one in this file is lost
+    when the swarm's time passes, not when a run begins which may fail at its start.
+    """
 
     def __init__(self, path: Path, scenario: Scenario, *, epoch_unix_ns: int, file: BinaryIO | None = None) -> None:
         """Raises ConfigError when the file cannot be opened. With `file` whatever hinders it is raised."""
@@ -109,25 +112,50 @@ class McapRecording(Observer):
         with writing(f"--record {path}"):
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file: BinaryIO = file or opened_alone(path)
-        self._writer = Writer(self._file, chunk_size=_CHUNK_BYTES)
+        self._writer: Writer | None = None
+        self._held: list[tuple[str, Any, int]] = []
+        """What was observed at instant 0, while there is no writer."""
         self._put("/scene/world", _world(scenario, self._around, self.state.places, self._stamp(0)), 0)
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
+    def __exit__(self, kind: object, *_: object) -> None:
+        if kind is not None and self._writer is None:
+            self._leave_earlier()
+        else:
+            self.close()
 
     def close(self) -> None:
         """Write the index; without it readers must search the file."""
         if self.failure is None:
             try:
-                self._writer.finish()
+                self._begun().finish()
                 if self._gives_up:
                     require_in_place(self._file, self.path)
                     self._file.close()
             except OSError as error:
                 self._give_up(error)
+
+    def _begun(self) -> Writer:
+        """The writer; the first call empties the file."""
+        if self._writer is None:
+            if self._gives_up:
+                self._file.truncate(0)
+            self._writer = Writer(self._file, chunk_size=_CHUNK_BYTES)
+            for one in self._held:
+                self._write(*one)
+            self._held.clear()
+        return self._writer
+
+    def _leave_earlier(self) -> None:
+        """Close the file as it was found: the run has failed before the swarm's time passed."""
+        if self._gives_up:
+            with contextlib.suppress(OSError):
+                if not os.fstat(self._file.fileno()).st_size:
+                    require_in_place(self._file, self.path)
+                    self.path.unlink()
+                self._file.close()
 
     def _give_up(self, error: OSError) -> None:
         if not self._gives_up:
@@ -280,21 +308,27 @@ class McapRecording(Observer):
     def _put(self, topic: str, message: Any, t_ns: int) -> None:  # noqa: ANN401  (protobuf's types are made at run time)
         if self.failure is not None:
             return
-        unix_ns = self.epoch_unix_ns + t_ns
         self.count += 1
+        if self._writer is None and not t_ns:
+            self._held.append((topic, message, t_ns))
+            return
         try:
-            self._writer.write_message(topic, message, log_time=unix_ns, publish_time=unix_ns)
+            self._begun()
+            self._write(topic, message, t_ns)
         except OSError as error:
             self._give_up(error)
 
+    def _write(self, topic: str, message: Any, t_ns: int) -> None:  # noqa: ANN401
+        assert self._writer is not None, "what is observed before is held"
+        unix_ns = self.epoch_unix_ns + t_ns
+        self._writer.write_message(topic, message, log_time=unix_ns, publish_time=unix_ns)
 
-def opened_alone(path: Path, *, emptied: bool = True) -> BinaryIO:
-    """A file that no other recording is written to, unless its file system locks nothing; raises ConfigError."""
+
+def opened_alone(path: Path) -> BinaryIO:
+    """A file, left as it is, that no other recording is written to, where files can be locked; raises ConfigError."""
     file = path.open("ab")
     try:
         keep_alone(file.fileno(), f"--record {path}: another run records there now; choose another file")
-        if emptied:
-            file.truncate(0)
     except BaseException:
         file.close()
         raise

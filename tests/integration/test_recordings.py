@@ -267,6 +267,34 @@ def test_a_recording_that_is_being_written_is_no_other_runs_even_by_force(tmp_pa
     assert path.read_bytes().startswith(before)
 
 
+UNMADE = """
+from fanet_mw.routing.flooding import Flooding
+class Unmade(Flooding):
+    def __init__(self, port): raise ValueError
+class Unstarted(Flooding):
+    def start(self, now_ns): raise ValueError
+class Unready(Flooding):
+    def next_wake_ns(self): return 0
+    def wake(self, now_ns): raise ValueError
+"""
+
+
+@pytest.mark.parametrize("part", ["Unmade", "Unstarted", "Unready"])
+def test_an_earlier_recording_stays_when_a_run_fails_at_its_start(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, part: str
+) -> None:
+    (tmp_path / "unmade.py").write_text(UNMADE)
+    monkeypatch.syspath_prepend(tmp_path)
+    old, new = tmp_path / "old.mcap", tmp_path / "new.mcap"
+    old.write_bytes(b"an hour of flight")
+    for path in (old, new):
+        words = ["simulate", "quick", "--record", str(path), "--force", "--set", f"routing.protocol=unmade:{part}"]
+        with pytest.raises((ConfigError, ValueError)):
+            app(words, result_action="return_value")
+    assert old.read_bytes() == b"an hour of flight"
+    assert not new.exists()
+
+
 @pytest.mark.parametrize(("replaced", "why"), [(False, "No such file"), (True, "another file has taken its place")])
 def test_a_recording_that_somebody_removes_meanwhile_ends_early_and_says_so(
     tmp_path: Path, replaced: bool, why: str

@@ -44,7 +44,7 @@ def simulate(
         scenario: A shipped scenario's name (see `fanet scenarios`) or a .toml file.
 
     """
-    from fanet_mw.scenario.fingerprint import modules_of
+    from fanet_mw.scenario.foreign_modules import modules_of
     from sim.cli.foreign_parts import in_own_process
     from sim.world.possible_world import require_possible
 

@@ -3,6 +3,7 @@
 import json
 import shlex
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -106,10 +107,35 @@ def check(file: ScenarioName, *, choice: ScenarioFlags = ScenarioFlags()) -> int
         file: A .toml file, or a shipped scenario's name.
 
     """
+    from fanet_mw.scenario.foreign_modules import modules_of
     from sim.world.possible_world import require_possible
 
     chosen = choice.scenario(file)
     require_possible(chosen)
+    parts = modules_of(chosen)
+    if not parts:
+        return _say_right(file, chosen)
+    from sim.cli.foreign_parts import in_own_process
+
+    return in_own_process(partial(_check_parts, file, chosen), parts)
+
+
+def _check_parts(file: str, chosen: "Scenario") -> int:
+    """Make the parts of other packages as a run does, because their constructors may refuse what they are given."""
+    from fanet_mw.part_failure import exits_raised
+    from fanet_mw.routing.clustered.clustering.division import Division
+    from sim.run.virtual import actors_of
+
+    clusters = chosen.clusters
+    with exits_raised():
+        actors_of(chosen, chosen.name)
+        if chosen.routing.protocol == "clustered":  # else nobody leads; a leader makes it in flight
+            range_m = clusters.link_m or chosen.radio.range_m
+            Division(clusters.method, count=clusters.count, range_m=range_m, options=clusters.options)
+    return _say_right(file, chosen)
+
+
+def _say_right(file: str, chosen: "Scenario") -> int:
     print_notes(chosen)
     Console().print(f"{file}: {_sentence(chosen)}", highlight=False, soft_wrap=True)
     return 0

@@ -28,7 +28,7 @@ from fanet_mw.hosts.virtual import VirtualHost
 from fanet_mw.node.reader import Reader
 from fanet_mw.part_failure import exits_raised, said_of
 from fanet_mw.scenario import Scenario
-from fanet_mw.scenario.fingerprint import modules_of
+from fanet_mw.scenario.foreign_modules import modules_of
 from fanet_mw.trace import Record
 from fanet_mw.units import MS, NodeId, S
 from sim.observation.observer import Observer

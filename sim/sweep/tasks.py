@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fanet_mw.errors import ConfigError
-from fanet_mw.scenario.fingerprint import identity, modules_of
+from fanet_mw.scenario.fingerprint import identity
+from fanet_mw.scenario.foreign_modules import modules_of
 from fanet_mw.scenario.model import Scenario
 from fanet_mw.scenario.named_files import digest_of
 from sim.scenarios import catalog

@@ -243,6 +243,10 @@ def test_a_part_that_cannot_be_made_is_named_with_its_class_and_what_is_wrong(
         simulate(scenario)
     assert str(caught.value).startswith(f"{key} = {name!r}: ")
     assert said.format(tmp_path / "parts.py") in str(caught.value)
+    words = ["check", "quick", "--set", "mission.survivors=0", change]
+    with pytest.raises(ConfigError) as checked:
+        app(words, result_action="return_value")
+    assert str(checked.value) == str(caught.value), "a check says so before a run"
 
 
 def test_a_part_that_cannot_be_made_is_named_by_its_entry_point(

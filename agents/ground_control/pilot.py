@@ -11,7 +11,7 @@ from typing import Final
 from agents.ground_control import settings as names
 from agents.ground_control.mission_flight import LAND, TAKEOFF, MissionFlight
 from agents.ground_control.plans import USUAL_SPEED, Area, Step, allowed
-from agents.ground_control.settings import Settings
+from agents.ground_control.settings import Setting, Settings
 from fanet_mw.application import HOME, Course
 from fanet_mw.flavors import Mode
 from fanet_mw.units import MS, Enu, S
@@ -95,6 +95,11 @@ class Pilot:
     def cruise_m_s(self) -> float:
         return self.settings[names.SPEED] if self.speed_m_s is None else self.speed_m_s
 
+    @property
+    def _speeds(self) -> Setting:
+        """The parameter of the usual speed, with the least and the greatest one."""
+        return self.settings.known[self.settings.index(names.SPEED) or 0]
+
     def take_course(self) -> Course | None:
         course, self._fly = self._fly, None
         return course
@@ -170,10 +175,10 @@ class Pilot:
     def setpoint(self, place: Enu | None, velocity: Enu | None, now_ns: int) -> bool:
         """One of an operator's setpoints: a place, or a velocity; it counts in the guided mode alone."""
         self._setpoint_ns = now_ns
-        if self.mode is not Mode.GUIDED or self.on_ground or not self.armed:
+        if self.mode is not Mode.GUIDED or not self.flies:
             return False
         if velocity is not None:
-            speed, most = velocity.norm(), self.settings.known[self.settings.index(names.SPEED) or 0].most
+            speed, most = velocity.norm(), self._speeds.most
             if speed > most:
                 speed, velocity = most, Enu(*(part * most / speed for part in velocity))
             course = Course(self.position, max(0.1, speed), velocity)
@@ -201,8 +206,7 @@ class Pilot:
 
     def change_speed(self, speed_m_s: float | None) -> bool:
         """Fly faster or slower until told otherwise; None: as fast as the parameter says, again."""
-        known = self.settings.known[self.settings.index(names.SPEED) or 0]
-        if speed_m_s is not None and not known.least <= speed_m_s <= known.most:
+        if speed_m_s is not None and not self._speeds.least <= speed_m_s <= self._speeds.most:
             return False
         self.speed_m_s = speed_m_s
         course = self._course
@@ -306,9 +310,9 @@ class Pilot:
         reached = self.settings[names.ACCEPTANCE]
         wanted = mission.fly(self.position, now_ns, reached_m=reached, on_ground=self.on_ground)
         if mission.speed_m_s is not None:
-            known = self.settings.known[self.settings.index(names.SPEED) or 0]
             usual = mission.speed_m_s == USUAL_SPEED
-            self.speed_m_s = None if usual else max(known.least, min(known.most, mission.speed_m_s))
+            within_m_s = max(self._speeds.least, min(self._speeds.most, mission.speed_m_s))
+            self.speed_m_s = None if usual else within_m_s
             mission.speed_m_s = None
         if mission.returns:
             self._say(_NOTICE, "Mission: returning")

@@ -110,7 +110,7 @@ def nodes_of(bits: int) -> tuple[NodeId, ...]:
     return tuple(nodes)
 
 
-def bits_of(nodes: Iterable[NodeId]) -> int:
+def bits_of(nodes: Iterable[int]) -> int:
     """The set of these nodes: bit i stands for node i + 1."""
     return sum(1 << (node - 1) for node in nodes)
 
@@ -129,8 +129,7 @@ def dominates(node: NodeId, links: Mapping[NodeId, int]) -> bool:
     """
     ours = links[node]
     near = nodes_of(ours)
-    later = {a: ours >> a << a for a in near}
-    """For each neighbor, those with greater ids: each pair is looked at once."""
+    later = {a: ours >> a << a for a in near}  # those with greater ids, so that each pair is looked at once
     if not any(later[a] & ~links[a] for a in near):
         return False
     known = ours
@@ -164,7 +163,7 @@ def _ways(links: Mapping[NodeId, int], near: Iterable[NodeId], stronger: int) ->
 def _stronger_than(node: NodeId, count: int) -> int:
     """The nodes, of the first `count` ones, that are stronger than `node`."""
     ours = _strength(node)
-    return bits_of(NodeId(n) for n in range(1, count + 1) if _strength(NodeId(n)) > ours)
+    return bits_of(n for n in range(1, count + 1) if _strength(NodeId(n)) > ours)
 
 
 def _strength(node: NodeId) -> tuple[int, NodeId]:

@@ -74,7 +74,8 @@ def _refused(control: Control) -> str:
     """Why an emulator that is there has recorded nothing of a change."""
     if not isinstance(control, Restore):
         return "refused (see `refused` in its report)"
-    return f"no fault that can end {f'has the label {control.label!r}' if control.label else 'is in force'}"
+    which = f"has the label {control.label!r}" if control.label else "is in force"
+    return f"no fault that can end {which}"
 
 
 def impossible(control: Control, tree: Mapping[str, Any], swarm: str) -> str | None:

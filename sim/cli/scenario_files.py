@@ -126,12 +126,10 @@ def _check_parts(file: str, chosen: "Scenario") -> int:
     from fanet_mw.routing.clustered.clustering.division import Division
     from sim.run.virtual import actors_of
 
-    clusters = chosen.clusters
     with exits_raised():
         actors_of(chosen, chosen.name)
         if chosen.routing.protocol == "clustered":  # else nobody leads; a leader makes it in flight
-            range_m = clusters.link_m or chosen.radio.range_m
-            Division(clusters.method, count=clusters.count, range_m=range_m, options=clusters.options)
+            Division.of(chosen)
     return _say_right(file, chosen)
 
 

@@ -48,11 +48,10 @@ class _Judged(NamedTuple):
 
 def members_of(scenario: Scenario, positions: Mapping[NodeId, Enu]) -> list[Cluster]:
     """The clusters that the leader will make once all have joined. It belongs to none; a timetable gives it turns."""
-    settings, range_m = scenario.clusters, scenario.clusters.link_m or scenario.radio.range_m
+    range_m = scenario.clusters.link_m or scenario.radio.range_m
     others = {node: at for node, at in positions.items() if node != scenario.leader}
     swarm = Swarm(others or positions, within_range(others or positions, range_m=range_m, reaches=scenario.reaches))
-    division = Division(settings.method, count=settings.count, range_m=range_m, options=settings.options)
-    clusters = division.divide(swarm)
+    clusters = Division.of(scenario).divide(swarm)
     if scenario.clusters.relay == "scheduled" and others and scenario.leader in positions:
         clusters.append(Cluster(scenario.leader, (scenario.leader,)))
     return clusters

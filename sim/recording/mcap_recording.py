@@ -113,7 +113,7 @@ class McapRecording(Observer):
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file: BinaryIO = file or opened_alone(path)
         self._writer: Writer | None = None
-        self._held: list[tuple[str, Any, int]] = []
+        self._held: list[tuple[str, Any]] = []
         """What was observed at instant 0, while there is no writer."""
         self._put("/scene/world", _world(scenario, self._around, self.state.places, self._stamp(0)), 0)
 
@@ -143,8 +143,8 @@ class McapRecording(Observer):
             if self._gives_up:
                 self._file.truncate(0)
             self._writer = Writer(self._file, chunk_size=_CHUNK_BYTES)
-            for one in self._held:
-                self._write(*one)
+            for topic, message in self._held:
+                self._write(topic, message, 0)
             self._held.clear()
         return self._writer
 
@@ -310,7 +310,7 @@ class McapRecording(Observer):
             return
         self.count += 1
         if self._writer is None and not t_ns:
-            self._held.append((topic, message, t_ns))
+            self._held.append((topic, message))
             return
         try:
             self._begun()

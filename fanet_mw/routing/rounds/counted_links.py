@@ -12,6 +12,7 @@ from functools import reduce
 from operator import or_
 from typing import Final
 
+from fanet_mw.graph.topology import bits_of
 from fanet_mw.motion import Motion
 from fanet_mw.routing.rounds.round_timing import RoundTiming
 from fanet_mw.units import Enu, NodeId, S
@@ -57,7 +58,7 @@ class LastingLinks:
     def among(self, near: int, own: Motion) -> int:
         """Those of a set of neighbors whose links will last, if this node flies on as it does now."""
         until_ns = own.at_ns + self._horizon_ns
-        hidden = sum(1 << (node - 1) for node, ends_ns in self.sight_ends_ns.items() if ends_ns <= until_ns)
+        hidden = bits_of(node for node, ends_ns in self.sight_ends_ns.items() if ends_ns <= until_ns)
         lasting, self.gone = near & ~hidden, 0
         for bit, motion, range_m in self._known(near, own):
             here = motion.offset_from(own.position, own.at_ns)

@@ -20,6 +20,7 @@ from typing import ClassVar, Final, NamedTuple
 from fanet_mw.bus.messages import Reception, TxStatus
 from fanet_mw.errors import DropReason
 from fanet_mw.geodesy import Geodetic
+from fanet_mw.graph.topology import bits_of
 from fanet_mw.motion import Motion
 from fanet_mw.node.contract import Port, RoutingProtocol
 from fanet_mw.node.duplicates import key_of, key_of_packet, origin_and_seq
@@ -533,7 +534,7 @@ class RoundFlooding(RoutingProtocol):
         if now_ns > self._near_until_ns:
             horizon_ns = now_ns - self._law.silent_ns
             near = {node: heard_ns for node, heard_ns in self._heard_ns.items() if heard_ns >= horizon_ns}
-            self._near = sum(1 << (node - 1) for node in near)
+            self._near = bits_of(near)
             self._near_until_ns = min(near.values(), default=now_ns) + self._law.silent_ns
         return self._near
 
@@ -660,7 +661,7 @@ class RoundFlooding(RoutingProtocol):
 
     def hold(self, nodes: Collection[NodeId]) -> None:
         if self._lasting is not None:
-            self._lasting.held = sum(1 << (node - 1) for node in nodes)
+            self._lasting.held = bits_of(nodes)
 
     def lose_sight(self, ends_ns: Mapping[NodeId, int]) -> None:
         if self._lasting is not None:

@@ -17,7 +17,7 @@ from heapq import heapify, heappop, heappush
 from itertools import islice
 from typing import Final
 
-from fanet_mw.graph.topology import nodes_of
+from fanet_mw.graph.topology import bits_of, nodes_of
 from fanet_mw.node.duplicates import key_of, origin_and_seq
 from fanet_mw.node.packet import Packet
 from fanet_mw.units import US
@@ -34,7 +34,7 @@ _OTHER_LINKS: Final = 2
 _MOST_VAIN: Final = 16
 """So often something is sent again for a neighbor that never shows to have heard anything."""
 _STALE_SHARE: Final = 4
-"""The heap of packets by how they are missed is made anew when it has so many entries for each packet kept."""
+"""The heap of packets by how they are missed is dropped when it has more entries than so many times the capacity."""
 _WAY_ROUND: Final = 2
 """The hops that a flood may need to reach a neighbor by relays that this node does not hear."""
 
@@ -123,8 +123,8 @@ class Spreading:
         self._links = links
         self._entries: dict[int, _Spread] = {}
         self._by_loss: list[_ByLoss] = []
-        """A heap of all packets, those that are missed least first, from when the first did not fit; outdated entries
-        are skipped."""
+        """A heap of all packets, those that are missed least first, while some do not fit; outdated entries are
+        skipped."""
         self.urgent: dict[int, _Spread] = {}
         self._waiting: set[int] = set()
         self._hasty: dict[int, _Spread] = {}
@@ -193,8 +193,7 @@ class Spreading:
             heappush(self._due, (bulk_from_ns, key))
             if src is not None and not entry.again:
                 entry.reached |= entry.senders | self._links[src]
-        if self._by_loss:
-            heappush(self._by_loss, entry.by_loss())
+        self._rate(entry)
         if len(self._entries) <= self._capacity:
             return None
         evicted = self._evict()
@@ -202,7 +201,7 @@ class Spreading:
 
     def _evict(self) -> _Spread:
         """Forget the packet that is missed least."""
-        if not self._by_loss or len(self._by_loss) > _STALE_SHARE * self._capacity:
+        if not self._by_loss:
             self._by_loss = [entry.by_loss() for entry in self._entries.values()]
             heapify(self._by_loss)
         while (key := heappop(self._by_loss)[-1]) not in self._entries:
@@ -210,6 +209,13 @@ class Spreading:
         entry = self._entries[key]
         self._remove(key)
         return entry
+
+    def _rate(self, entry: _Spread) -> None:
+        """Note how much a packet is missed now."""
+        if len(self._by_loss) > _STALE_SHARE * self._capacity:
+            self._by_loss.clear()  # made anew when the next packet does not fit
+        if self._by_loss:
+            heappush(self._by_loss, entry.by_loss())
 
     def _remove(self, key: int) -> None:
         del self._entries[key]
@@ -321,7 +327,7 @@ class Spreading:
         """The neighbors that show by nothing that they hear: not by what they send or hold, nor by a link."""
         if not self._vain:
             return 0
-        deaf = sum(1 << (node - 1) for node, times in self._vain.items() if times >= _MOST_VAIN)
+        deaf = bits_of(node for node, times in self._vain.items() if times >= _MOST_VAIN)
         return deaf & ~self._links[self._node]
 
     def _patient_ns(self, entry: _Spread) -> int:
@@ -343,8 +349,8 @@ class Spreading:
         self.repeated += entry.sent > 0
         entry.sent += 1
         entry.sent_ns = start_ns
-        if self._by_loss and entry.sent == 1:
-            heappush(self._by_loss, entry.by_loss())
+        if entry.sent == 1:
+            self._rate(entry)
         self._waiting.discard(key)
         self._hasty.pop(key, None)
         return entry.sent

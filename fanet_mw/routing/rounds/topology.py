@@ -10,7 +10,7 @@ from functools import reduce
 from operator import or_
 from typing import Final, NamedTuple
 
-from fanet_mw.graph.topology import dominates, nodes_of
+from fanet_mw.graph.topology import bits_of, dominates, nodes_of
 from fanet_mw.units import NodeId, S
 from fanet_mw.wire.rounds import HeardNodes
 
@@ -271,7 +271,7 @@ class Topology:
         lost node as a neighbor for a while.
         """
         self._arrange(now_ns)
-        passed = sum(1 << (node - 1) for node in without)
+        passed = bits_of(without)
         if self._parted_for != (self._link_changes, passed):
             self._parted_for = self._link_changes, passed
             reached = reduce(or_, self._rings_from(self._node, without=passed))

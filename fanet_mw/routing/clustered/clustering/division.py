@@ -7,13 +7,14 @@ taken if they cost `_WORSE` times as much. Heads, and their slots, are kept if t
 import math
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Any, Final, Self
 
 from fanet_mw.errors import ConfigError, LocalProtocolError
 from fanet_mw.extensions import make
 from fanet_mw.graph.topology import Adjacency, levels
 from fanet_mw.routing.clustered.clustering import Balanced, Cluster, Clustering, Promise, Swarm
 from fanet_mw.routing.clustered.clustering.bisection import among
+from fanet_mw.scenario import Scenario
 from fanet_mw.scenario.tables.clusters import METHODS
 from fanet_mw.units import NodeId
 
@@ -35,6 +36,13 @@ class Division:
             made = make("clusters.method", method, count=count, range_m=range_m, options=options)
             self._method = _Foreign(method, made)
             self._count = None if self._method.promise.dominating else count
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> Self:
+        """The division by a scenario's method, over links as long as its clusters or its radio have them."""
+        clusters = scenario.clusters
+        range_m = clusters.link_m or scenario.radio.range_m
+        return cls(clusters.method, count=clusters.count, range_m=range_m, options=clusters.options)
 
     def divide(self, swarm: Swarm) -> list[Cluster]:
         return self._method.divide(swarm)

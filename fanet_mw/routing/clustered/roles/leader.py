@@ -110,9 +110,7 @@ class Leader:
             settled_ns=settled_ns(scenario),
             rigid=scenario.mobility.rigid,
         )
-        self._division = Division(
-            clusters.method, count=clusters.count, range_m=self._range_m, options=clusters.options
-        )
+        self._division = Division.of(scenario)
         self.epoch = epoch
         self._links = LinkState() if scenario.measures_links else None
         self._heard = heard

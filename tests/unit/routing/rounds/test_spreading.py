@@ -12,6 +12,7 @@ from fanet_mw.node.packet import Packet
 from fanet_mw.routing.rounds.spreading import Spreading
 from fanet_mw.units import BROADCAST, MS, NodeId, S
 from fanet_mw.wire import Header, Kind
+from tests.benchmarks.growth import entries
 
 ROUND = 100 * MS
 CAPACITY = 8
@@ -304,7 +305,7 @@ def test_bulk_that_was_sent_is_evicted_before_bulk_that_was_not() -> None:
 def test_of_all_packets_the_one_is_evicted_that_is_missed_least(seed: int) -> None:
     draw = random.Random(seed)
     made, kept = spreading(), dict[int, tuple[int, bool, int]]()
-    """`kept`: of each packet its priority, whether it was sent, and its birth; those that came first are first."""
+    # of each packet kept: its priority, whether it was sent, and its birth
     for seq in range(300):
         what, origin_us = draw.choice(("report", "bulk", "send")), draw.randrange(20)
         if what == "send":
@@ -477,3 +478,15 @@ def test_where_frames_are_lost_at_random_each_node_sends_once_so_that_all_see_wh
     made.on_copy(key_of_packet(packet(1)), 3, neighbors=nodes((2, 3)), now_ns=10)
     assert made.spared(nodes((2, 3))) == []
     assert sent_in_turn(made, 1) == [1]
+
+
+def test_a_node_whose_queue_was_full_once_keeps_no_more_for_each_later_packet() -> None:
+    made = spreading()
+    for seq in range(2 * CAPACITY):
+        made.push(packet(seq), src=None, now_ns=0)
+    for seq in range(2 * CAPACITY, 1000):
+        for sent in made.wanted(nodes((2, 3)), start_ns=0):
+            made.sent(sent, start_ns=0)
+            made.forget(sent)
+        made.push(packet(seq), src=None, now_ns=0)
+    assert entries([made]).total() < 10 * CAPACITY

@@ -137,7 +137,7 @@ def dominates(node: NodeId, links: Mapping[NodeId, int]) -> bool:
         known |= links[a]
     reached = {a: links[a] for a in near}
     for way in _ways(links, near, known & _stronger_than(node, known.bit_length())):
-        beside = [a for a in near if (links[a] | 1 << (a - 1)) & way]
+        beside = [a for a in near if links[a] & way]  # or it is the way by itself, and joins nobody
         joined = bits_of(beside)
         for a in beside:
             reached[a] |= joined

@@ -142,6 +142,7 @@ class McapRecording(Observer):
         if self._writer is None:
             if self._gives_up:
                 self._file.truncate(0)
+                self._file.seek(0)  # from where the index counts
             self._writer = Writer(self._file, chunk_size=_CHUNK_BYTES)
             for topic, message in self._held:
                 self._write(topic, message, 0)

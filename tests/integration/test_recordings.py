@@ -248,6 +248,7 @@ def test_a_recording_has_the_positions_links_and_events_of_the_run(folder: Path)
 def test_an_observer_changes_nothing_and_sees_the_same_run_twice(tmp_path: Path) -> None:
     scenario = catalog.find("quick", ["duration_s=7", "drain_s=1"])
     plain = simulate(scenario)
+    (tmp_path / "b").write_bytes(b"an earlier flight")
     for name in ("a", "b"):
         with McapRecording(tmp_path / name, scenario, epoch_unix_ns=EPOCH_UNIX_NS) as recording:
             assert list(simulate(scenario, observer=recording).records) == list(plain.records)

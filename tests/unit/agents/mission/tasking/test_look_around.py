@@ -105,3 +105,22 @@ def test_who_wants_to_another_point_is_held_back_only_after_it_has_stood_as_long
     headway, here = Headway(), Enu(0, 0, UP_M)
     held = [headway.is_held_back((100.0 if second < 3 else -100.0, 0.0), here, second * S) for second in range(7)]
     assert held == [False] * 6 + [True]
+
+
+def test_who_was_held_back_on_the_way_to_one_survivor_looks_for_another_one_in_all_directions() -> None:
+    here = Enu(0, 0, UP_M)
+    phone, looked_at = heard_once(Enu(80, 0, 0), here), LookedAt(VIEW_M, height_m=UP_M)
+    looked_at.note(here, 0)
+    look = LookAround(looked_at)
+    places = [look.next_place(1, phone, here, second * S) for second in range(5)]
+    assert places[-1] != places[0]
+    assert look.next_place(2, phone, here, 5 * S) == places[0]
+
+
+def test_who_stands_at_the_very_place_is_not_held_back_from_it() -> None:
+    looked_at = LookedAt(VIEW_M, height_m=UP_M)
+    look, phone = LookAround(looked_at), heard_once(Enu(0, 0, 0), Enu(0, 0, UP_M))
+    place = look.next_place(1, phone, Enu(0, 0, UP_M), 0)
+    assert place is not None
+    at = Enu(*place, UP_M)
+    assert [look.next_place(1, phone, at, second * S) for second in range(1, 6)] == [place] * 5

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from fanet_mw.graph.topology import within_range
 from fanet_mw.motion import Motion
-from fanet_mw.routing.clustered.clustering import Cluster, Swarm
+from fanet_mw.routing.clustered.clustering import Balanced, Cluster, Swarm
 from fanet_mw.routing.clustered.clustering.division import Division, carried_on, cost, drift
 from fanet_mw.routing.clustered.roles.failure_detectors import Liveness
 from fanet_mw.routing.clustered.roles.leader_election import Authority, Lease
@@ -144,3 +144,20 @@ def test_old_news_of_a_leader_keep_nobody_obedient() -> None:
     assert not lease.accept(Authority(3, 2), born_ns=14 * S, now_ns=14 * S)
     assert not lease.accept(Authority(0, 1), born_ns=9 * S, now_ns=15 * S)
     assert lease.accept(Authority(3, 2), born_ns=15 * S, now_ns=15 * S)
+
+
+@pytest.mark.parametrize(("link_m", "range_m"), [(120.0, 120.0), (0.0, 250.0)])
+def test_a_method_of_another_package_is_told_how_long_the_links_of_the_clusters_are(
+    make_scenario, monkeypatch: pytest.MonkeyPatch, link_m: float, range_m: float
+) -> None:
+    told: list[float] = []
+
+    def make(_key: str, _name: str, *, range_m: float, **_: object) -> Balanced:
+        told.append(range_m)
+        return Balanced(2)
+
+    monkeypatch.setattr("fanet_mw.routing.clustered.clustering.division.make", make)
+    scenario = make_scenario(**{"clusters.link_m": link_m, "radio.range_m": 250.0})
+    clusters = scenario.clusters.model_copy(update={"method": "another"})
+    Division.of(scenario.model_copy(update={"clusters": clusters}))
+    assert told == [range_m]

@@ -10,7 +10,7 @@ from fanet_mw.autopilot.serving import Autopilot, serve_world
 from fanet_mw.flavors import Flavor
 from fanet_mw.gateway.gateway import per_uav
 from fanet_mw.geodesy import Geodetic
-from fanet_mw.hosts.clock import START_PATIENCE_S, ClockListener
+from fanet_mw.hosts.clock import START_PATIENCE_S, ClockListener, SwarmClock
 from fanet_mw.hosts.loop import heeding
 from fanet_mw.hosts.readiness import tell_ready
 from fanet_mw.scenario.fingerprint import fingerprint
@@ -38,7 +38,7 @@ async def run(
         bus, names, scenario = feed.bus, feed.names, feed.scenario
         listener = ClockListener(bus, names)
         origin = Geodetic(*scenario.world.origin_deg, 0.0)
-        clock = None
+        clock: SwarmClock | None = None
 
         def now_ns() -> int:
             return 0 if clock is None else max(0, clock.now_ns())
@@ -60,7 +60,8 @@ async def run(
                 return 0
             bus.announce(names.alive(WORLD, fingerprint=fingerprint(scenario), instance="autopilots"))
             tell_ready()
-            clock = await listener.running(timeout_s=START_PATIENCE_S)
+            if (clock := await _started(listener, over, serving)) is None:
+                return 0
             while not over.is_set() and not listener.stopped.is_set() and not serving.done():
                 if clock.wait_s(clock.ends_ns or scenario.duration_ns) <= 0:
                     break
@@ -72,6 +73,20 @@ async def run(
             for autopilot in autopilots.values():
                 autopilot.connection.close()
     return 0
+
+
+async def _started(listener: ClockListener, over: asyncio.Event, serving: "asyncio.Future[None]") -> SwarmClock | None:
+    """The swarm's clock once it runs; None if somebody ends the wait."""
+    starting = asyncio.ensure_future(listener.running(timeout_s=START_PATIENCE_S))
+    ended = asyncio.ensure_future(over.wait())
+    try:
+        await asyncio.wait((starting, ended, serving), return_when=asyncio.FIRST_COMPLETED)
+        if serving.done():
+            serving.result()
+        return starting.result() if starting.done() else None
+    finally:
+        starting.cancel()
+        ended.cancel()
 
 
 async def _all_heard(

@@ -1,6 +1,7 @@
 """Commands beside a swarm that runs take the signals of the loop on which they run only while they run."""
 
 import asyncio
+import os
 import signal
 import socket
 import subprocess
@@ -10,10 +11,12 @@ from typing import Any, Self
 
 import pytest
 
+from fanet_mw.bus.topics import Topics
 from fanet_mw.errors import BusError
 from fanet_mw.flavors import Flavor
 from fanet_mw.gateway.gateway import Doors
 from sim.run import autopilots, gateway
+from sim.scenarios import catalog
 
 COMMANDS: dict[str, Callable[[], Coroutine[Any, Any, int]]] = {
     "autopilots": lambda: autopilots.run(
@@ -56,6 +59,46 @@ def test_a_command_that_is_over_leaves_the_signals_to_others(name: str, monkeypa
     monkeypatch.setattr(gateway, "serve", fail)
     assert asyncio.run(run()) == [False, False]
     assert heard != [before], "it heeds them while it runs"
+
+
+class Unstarted:
+    """The router of a swarm whose clock does not start, because somebody else is missing."""
+
+    def __init__(self) -> None:
+        self.announced: list[str] = []
+
+    def announce(self, topic: str) -> None:
+        self.announced.append(topic)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    def nothing(self, *_: object, **__: object) -> None:
+        pass
+
+    subscribe = ask = put = check = nothing
+
+
+def test_a_world_of_flight_controllers_that_waits_for_the_clock_ends_when_interrupted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    router, feed = Unstarted(), Joined()
+    feed.bus, feed.names = router, Topics("small")  # type: ignore[assignment]
+    feed.scenario = catalog.find("quick", ["mobility.model=onboard"])  # type: ignore[assignment]
+
+    async def heard(*_: object) -> bool:
+        return True
+
+    async def run() -> int:
+        return await asyncio.wait_for(
+            autopilots.run(
+                "tcp/127.0.0.1:9", None, "udpin:127.0.0.1:24541+", flavor=Flavor.PX4, zenoh_config=None, tell=print
+            ),
+            10,
+        )
+
+    monkeypatch.setattr(autopilots, "BusFeed", lambda *_, **__: feed)
+    monkeypatch.setattr(autopilots, "_all_heard", heard)
+    assert asyncio.run(run()) == 0
+    assert router.announced, "it was interrupted only after it had come up"
 
 
 @pytest.mark.parametrize("words", [["gateway"], ["autopilots", "udpin:127.0.0.1:14999+"]], ids=lambda words: words[0])

@@ -16,7 +16,7 @@ from agents.ground_control import settings as names
 from agents.ground_control.commands import Commands, is_question
 from agents.ground_control.pilot import Pilot
 from agents.ground_control.plan_transfer import Peer, PlanTransfer
-from agents.ground_control.plans import Ground, Item, Kind, RefusedError, fence_of, rally_of, step_of
+from agents.ground_control.plans import Ground, Item, Kind, fence_of, rally_of, step_of
 from agents.ground_control.settings import LONGEST_NAME, Settings, settings_of
 from agents.ground_control.telemetry_pace import pace_of
 from fanet_mw.application import Application, Course, Fate, Received, Status
@@ -493,8 +493,8 @@ class GroundControl(Application):
         pilot = self._pilot
         if kind is Kind.MISSION:
             steps = [step_of(item, self._ground) for item in items]
-            if not all(pilot.may_fly(step) for step in steps):
-                raise RefusedError(common.MAV_MISSION_INVALID_PARAM7)
+            for step in steps:
+                pilot.require_flyable(step)
             flies = pilot.commands and not pilot.mission.idle
             pilot.mission.load(steps)
             if flies:

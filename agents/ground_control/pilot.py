@@ -10,10 +10,11 @@ from typing import Final
 
 from agents.ground_control import settings as names
 from agents.ground_control.mission_flight import LAND, TAKEOFF, MissionFlight
-from agents.ground_control.plans import USUAL_SPEED, Area, Step, allowed
+from agents.ground_control.plans import USUAL_SPEED, Area, RefusedError, Step, allowed
 from agents.ground_control.settings import Setting, Settings
 from fanet_mw.application import HOME, Course
 from fanet_mw.flavors import Mode
+from fanet_mw.mavlink import common
 from fanet_mw.units import MS, Enu, S
 
 SETPOINT_LASTS_NS: Final = 1000 * MS
@@ -108,18 +109,32 @@ class Pilot:
 
     def allows(self, place: Enu) -> bool:
         """True for a place to which an operator may send the UAV: inside the area, the fence, and above the ground."""
-        area = self._area_m
-        inside = area is None or (abs(place.east) <= area.east and abs(place.north) <= area.north)
-        return inside and _LOWEST_M <= place.up <= _HIGHEST_M and allowed(self.fence, place)
+        return self._objection(place) is None
 
-    def may_fly(self, step: Step) -> bool:
-        """True if no place of a mission's item is out of bounds; a landing leads to the ground."""
+    def _objection(self, place: Enu) -> int | None:
+        """The MAV_MISSION_RESULT for a place that is out of bounds; None if it is not."""
+        area = self._area_m
+        why: int | None = None
+        if area is not None and abs(place.north) > area.north:
+            why = common.MAV_MISSION_INVALID_PARAM5_X
+        elif area is not None and abs(place.east) > area.east:
+            why = common.MAV_MISSION_INVALID_PARAM6_Y
+        elif not _LOWEST_M <= place.up <= _HIGHEST_M:
+            why = common.MAV_MISSION_INVALID_PARAM7
+        elif not allowed(self.fence, place):
+            why = common.MAV_MISSION_INVALID
+        return why
+
+    def require_flyable(self, step: Step) -> None:
+        """Raise RefusedError if the place of a mission's item is out of bounds; a landing leads to the ground."""
         place = step.place
         if place is None:
-            return True
+            return
         if math.isnan(place.east):
             place = self.home._replace(up=place.up)
-        return self.allows(place._replace(up=max(_LOWEST_M, place.up)) if step.command == LAND else place)
+        why = self._objection(place._replace(up=max(_LOWEST_M, place.up)) if step.command == LAND else place)
+        if why is not None:
+            raise RefusedError(why)
 
     def arm(self) -> bool:
         self.armed = self._commanded = True

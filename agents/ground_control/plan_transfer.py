@@ -54,7 +54,7 @@ class PlanTransfer:
         self.plans: dict[Kind, list[Item]] = {kind: [] for kind in Kind}
         self._uploads: dict[Kind, _Upload] = {}
         self._ended: dict[Kind, tuple[Peer, int, int]] = {}
-        """Whose upload of each kind came to its end last, the number of its items, and the result."""
+        """Whose upload of each kind has ended since the last one began, the number of items that came, the result."""
 
     def next_due_ns(self) -> int | None:
         return earliest(*(upload.due_ns for upload in self._uploads.values()))
@@ -93,6 +93,7 @@ class PlanTransfer:
             self._uploads.pop(kind, None)
             self._finish(kind, [], peer)
         else:
+            self._ended.pop(kind, None)
             upload = self._uploads[kind] = _Upload(peer, message.count, now_ns)
             self._request(kind, upload, now_ns)
 
@@ -110,6 +111,7 @@ class PlanTransfer:
                 self._check(kind, item)
             except RefusedError as refused:
                 del self._uploads[kind]
+                self._ended[kind] = peer, message.seq + 1, refused.result
                 self._ack(peer, kind, refused.result)
                 return
             upload.items.append(item)
@@ -151,6 +153,7 @@ class PlanTransfer:
     def _on_clear(self, message: Any, peer: Peer, _now_ns: int) -> None:  # noqa: ANN401
         for kind in Kind if message.mission_type == _ALL else (Kind(message.mission_type),):
             self._uploads.pop(kind, None)
+            self._ended.pop(kind, None)
             self._accept(kind, [])
             self.plans[kind] = []
         self._ack(peer, message.mission_type, _ACCEPTED)

@@ -70,11 +70,17 @@ def item_of(message: Any) -> Item:  # noqa: ANN401  (pymavlink has no types)
     x, y = message.x, message.y
     if message.get_type() == "MISSION_ITEM":
         scale = 1 if message.frame == common.MAV_FRAME_MISSION else 1e7
-        if not (math.isfinite(x) and math.isfinite(y) and abs(x * scale) < 2**31 and abs(y * scale) < 2**31):
+        if not abs(x * scale) < 2**31:
             raise RefusedError(common.MAV_MISSION_INVALID_PARAM5_X)
+        if not abs(y * scale) < 2**31:
+            raise RefusedError(common.MAV_MISSION_INVALID_PARAM6_Y)
         x, y = round(x * scale), round(y * scale)
     params = (message.param1, message.param2, message.param3, message.param4)
     return Item(message.frame, message.command, message.autocontinue, params, x, y, message.z)
+
+
+_MOST_LAT: Final = 900_000_000
+_MOST_LON: Final = 1_800_000_000
 
 
 class Ground(NamedTuple):
@@ -92,10 +98,24 @@ class Ground(NamedTuple):
     def place(self, frame: int, x: int, y: int, z: float) -> Enu | None:
         """A place in the swarm's frame; its height over the ground plane is kept, not that over a round earth."""
         up_m = self.height(frame, z)
-        if up_m is None or abs(x) > 900_000_000 or abs(y) > 1_800_000_000 or not math.isfinite(up_m):
+        if up_m is None or abs(x) > _MOST_LAT or abs(y) > _MOST_LON or not math.isfinite(up_m):
             return None
         flat = to_enu(Geodetic(x / 1e7, y / 1e7, self.origin.alt_m), self.origin)
         return Enu(flat.east, flat.north, up_m)
+
+
+def _place_of(item: Item, ground: Ground) -> Enu:
+    """The place of an item; raises RefusedError with the parameter that is wrong."""
+    if ground.height(item.frame, item.z) is None:
+        raise RefusedError(common.MAV_MISSION_UNSUPPORTED_FRAME)
+    if abs(item.x) > _MOST_LAT:
+        raise RefusedError(common.MAV_MISSION_INVALID_PARAM5_X)
+    if abs(item.y) > _MOST_LON:
+        raise RefusedError(common.MAV_MISSION_INVALID_PARAM6_Y)
+    place = ground.place(item.frame, item.x, item.y, item.z)
+    if place is None:
+        raise RefusedError(common.MAV_MISSION_INVALID_PARAM7)
+    return place
 
 
 class Step(NamedTuple):
@@ -117,13 +137,8 @@ def step_of(item: Item, ground: Ground) -> Step:
         return Step(item.command, None, item.params)
     if item.command not in _PLACES:
         raise RefusedError(common.MAV_MISSION_UNSUPPORTED)
-    up_m = ground.height(item.frame, item.z)
-    if up_m is None:
-        raise RefusedError(common.MAV_MISSION_UNSUPPORTED_FRAME)
+    place = _place_of(item, ground)
     here = not item.x and not item.y and item.command in (common.MAV_CMD_NAV_LAND, common.MAV_CMD_NAV_TAKEOFF)
-    place = ground.place(item.frame, item.x, item.y, item.z)
-    if place is None:
-        raise RefusedError(common.MAV_MISSION_INVALID_PARAM5_X)
     return Step(item.command, place._replace(east=math.nan, north=math.nan) if here else place, item.params)
 
 
@@ -164,9 +179,9 @@ def fence_of(items: Sequence[Item], ground: Ground) -> tuple[Area, ...]:
             raise RefusedError(common.MAV_MISSION_INVALID_PARAM1)
         corners = []
         for vertex in items[at : at + count]:
-            place = ground.place(common.MAV_FRAME_GLOBAL, vertex.x, vertex.y, 0.0)
-            if vertex.command != item.command or place is None:
-                raise RefusedError(common.MAV_MISSION_INVALID_PARAM5_X)
+            if vertex.command != item.command:
+                raise RefusedError(common.MAV_MISSION_INVALID_SEQUENCE)
+            place = _place_of(vertex._replace(frame=common.MAV_FRAME_GLOBAL, z=0.0), ground)
             corners.append((place.east, place.north))
         radius_m = item.params[0] if circle else 0.0
         areas.append(Area(item.command in (_IN_CIRCLE, _IN_POLYGON), tuple(corners), radius_m))
@@ -180,10 +195,7 @@ def rally_of(items: Sequence[Item], ground: Ground) -> tuple[Enu, ...]:
     for item in items:
         if item.command != common.MAV_CMD_NAV_RALLY_POINT:
             raise RefusedError(common.MAV_MISSION_UNSUPPORTED)
-        place = ground.place(item.frame, item.x, item.y, item.z)
-        if place is None:
-            raise RefusedError(common.MAV_MISSION_UNSUPPORTED_FRAME)
-        places.append(place)
+        places.append(_place_of(item, ground))
     return tuple(places)
 
 

@@ -16,7 +16,7 @@ from fanet_mw.application import Application, Fate, Received, Status
 from fanet_mw.delivery.receiver import Receiver, Whole
 from fanet_mw.delivery.sender import EXPIRED, PieceToSend, Sender, Told
 from fanet_mw.errors import DropReason, LocalProtocolError
-from fanet_mw.node.header_check import CONTROL, RESTART_STEP_NS
+from fanet_mw.node.header_check import CONTROL
 from fanet_mw.node.node import Node
 from fanet_mw.node.packet import Packet
 from fanet_mw.node.packet_watch import PacketNews, RadioStage
@@ -132,6 +132,10 @@ class Statuses:
         self.tell(application, Status(handle, fate, t_ns, reason, last=True, interval_ns=interval_ns))
 
 
+_MESSAGE_STEP_NS: Final = 500 * US
+"""A node sends fewer messages than one in this time, so a restarted one begins above all its earlier numbers. Readers
+compare them, and in the longest swarm, 1,000,000 s, they do not begin again.
+"""
 _RECEIPT_APP: Final = "receipt"
 _RADIO_FATES: Final = frozenset((Fate.SENT, Fate.TURNED_AWAY))
 
@@ -161,7 +165,7 @@ class Messenger:
         self._counts: Counter[str] = Counter()
 
     def start(self, now_ns: int) -> None:
-        self._sender.start(CONTROL | now_ns // RESTART_STEP_NS % CONTROL)
+        self._sender.start(CONTROL | now_ns // _MESSAGE_STEP_NS % CONTROL)
 
     # --- out ------------------------------------------------------------------------------------------------------
 

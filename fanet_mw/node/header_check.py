@@ -34,7 +34,7 @@ _LATEST: Final = 8
 """The transmitters that decide whether the own clock is behind: those that were heard last."""
 _SEVERAL: Final = 2
 _STEP_US: Final = RESTART_STEP_NS // US
-_NUMBER: Final = CONTROL - 1
+NUMBER: Final = CONTROL - 1
 """The bits of a sequence number that count the packets of its kind."""
 _DATA: Final = int(Kind.DATA)
 _HELLO: Final = int(Kind.HELLO)
@@ -70,7 +70,7 @@ class HeaderCheck:
             return DropReason.UNKNOWN_NODE
         if origin == self._node and not before and not (kind == _DATA and self._handed_on(seq)):
             return DropReason.OWN
-        number = seq & _NUMBER
+        number = seq & NUMBER
         if (
             prev_hop != src
             or (origin != prev_hop and (hops == 0 or kind == _HELLO))

@@ -1,7 +1,8 @@
 """The packets that a node originates: numbered without gaps, and in its duplicate set before any copy comes back.
 
 Data and control packets have sequence numbers of their own, so that a gap in the numbers of data shows a lost packet. A
-node that starts again must not use its earlier numbers: it begins above all numbers that it had time to use.
+node that starts again must not use its earlier numbers: it begins above all numbers that it had time to use. After the
+last number of its kind, 59 hours on, follows the first: nobody remembers a packet for so long.
 """
 
 from typing import Final
@@ -10,7 +11,7 @@ from fanet_mw import wire
 from fanet_mw.errors import LocalProtocolError
 from fanet_mw.node import duplicates
 from fanet_mw.node.duplicates import PHASES, DuplicateSet, hash_of
-from fanet_mw.node.header_check import CONTROL, RESTART_STEP_NS
+from fanet_mw.node.header_check import CONTROL, NUMBER, RESTART_STEP_NS
 from fanet_mw.node.packet import Packet
 from fanet_mw.units import US, NodeId
 from fanet_mw.wire import Header, Kind
@@ -26,13 +27,13 @@ class PacketNumbering:
         self._duplicates = duplicate_set
         self._most_bytes = most_bytes
         """The greatest length of a frame (`radio.max_frame_bytes`)."""
-        self._first_seq, self._next_seq = 0, {False: 0, True: CONTROL}
+        self._first, self._next = 0, {False: 0, True: 0}
         self.held: set[bytes] = set()
         """The names (`wire.NAME`) of data packets that were accepted, and of which no frame has been announced yet."""
 
     def start(self, now_ns: int) -> None:
         first = now_ns // RESTART_STEP_NS % CONTROL
-        self._first_seq, self._next_seq = first, {False: first, True: CONTROL + first}
+        self._first, self._next = first, {False: first, True: first}
 
     def make(
         self, kind: Kind, inner: bytes, *, destination: NodeId, priority: int, flags: int, hop_limit: int, born_ns: int
@@ -43,8 +44,9 @@ class PacketNumbering:
         if size > bound:
             raise LocalProtocolError(f"frame of {size} bytes must be <= radio.max_frame_bytes = {bound}")
         control = kind is not Kind.DATA
-        seq = self._next_seq[control]
-        self._next_seq[control] = seq + 1
+        number = self._next[control]
+        self._next[control] = number + 1 & NUMBER
+        seq = number | CONTROL if control else number
         node, hops = self._node, 0
         header = _new(
             Header, (born_ns // US, seq, node, destination, node, kind, hop_limit, hops, priority, flags)
@@ -59,4 +61,4 @@ class PacketNumbering:
 
     def handed_on(self, seq: int) -> bool:
         """True for a data packet originated since the start and handed over: it may come back."""
-        return self._first_seq <= seq < self._next_seq[False]
+        return seq < CONTROL and seq - self._first & NUMBER < self._next[False] - self._first & NUMBER

@@ -13,6 +13,7 @@ from agents.submission import Sending, Submission
 from fanet_mw import mavlink
 from fanet_mw.application import Application, Data, Destination, Fate, Status
 from fanet_mw.errors import DropReason, LocalProtocolError
+from fanet_mw.node.header_check import CONTROL
 from fanet_mw.node.node import Node
 from fanet_mw.node.packet_watch import PacketNews
 from fanet_mw.routing.direct import Direct
@@ -114,6 +115,19 @@ def test_where_no_bound_is_stated_a_deadline_is_taken_as_it_is(make_scenario: Ma
     for _ in range(2):
         desk.send(BYTES, deadline_ns=1)
         assert desk.told()[0].fate is Fate.ADMITTED
+
+
+def test_a_node_that_starts_again_numbers_its_messages_above_the_earlier_ones_as_long_as_a_swarm_may_last(
+    make_scenario: MakeScenario,
+) -> None:
+    """Readers take a confirmed message for an old one if its number is not greater than that of the last."""
+    desk, starts_s = Desk(make_scenario), (0, 1, 214_748, 214_749, 429_497, 999_999)
+    handles = []
+    for start_s in starts_s:
+        desk.messenger.start(start_s * S)
+        handles.append(desk.send(BYTES, at_ns=start_s * S, confirm=True))
+    assert handles == sorted(set(handles))
+    assert all(CONTROL <= handle < 2 * CONTROL for handle in handles)
 
 
 def test_a_dropped_piece_of_a_confirmed_message_is_no_end_of_it(make_scenario: MakeScenario) -> None:

@@ -7,6 +7,7 @@ from fanet_mw import wire
 from fanet_mw.bus.messages import Reception, TxOutcome, TxStatus
 from fanet_mw.errors import DropReason, LocalProtocolError
 from fanet_mw.node.duplicates import DuplicateSet
+from fanet_mw.node.header_check import CONTROL, RESTART_STEP_NS
 from fanet_mw.node.node import Node
 from fanet_mw.node.packet import Packet
 from fanet_mw.node.packet_watch import RadioStage
@@ -227,6 +228,19 @@ def test_a_node_that_starts_again_does_not_reuse_the_names_of_its_packets(node: 
     before = [send(node) for _ in range(100)]
     node.start(10 * S)
     assert send(node, born_ns=10 * S, now_ns=10 * S) > max(before)
+
+
+def test_numbers_begin_again_when_their_bits_are_used_up_and_each_kind_keeps_its_own(node: Node) -> None:
+    """A node that started 59 h 39 min after the swarm ended within a second, by a number that had no room."""
+    started_ns = (CONTROL - 2) * RESTART_STEP_NS
+    node.start(started_ns)
+    made = [send(node, born_ns=started_ns, now_ns=started_ns) for _ in range(4)]
+    assert made == [CONTROL - 2, CONTROL - 1, 0, 1]
+    said = [node.say_hello(b"", start_ns=started_ns, now_ns=started_ns).number for _ in range(4)]
+    assert said == [CONTROL + number for number in made]
+    assert [node._own.handed_on(number) for number in (CONTROL - 3, *made, 2, *said)] == [
+        False, True, True, True, True, False, False, False, False, False,
+    ]  # fmt: skip
 
 
 def test_a_packet_longer_than_frames_may_be_is_a_mistake_of_the_caller(node: Node) -> None:

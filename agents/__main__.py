@@ -68,7 +68,7 @@ async def _run(
 ) -> None:
     names = Topics(address.swarm)
     config = config_of(address.zenoh_config, uav.name)
-    with Bus.join(address.endpoint, config, patience_s=address.patience_s) as inner:
+    with await Bus.join_on_loop(address.endpoint, config, patience_s=address.patience_s) as inner:
         bus = AutopilotBus(inner, names, node)
         host = RealtimeHost(uav, bus, names)
         async with _beside(bus, controller, host, scenario, node):

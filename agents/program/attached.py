@@ -152,8 +152,7 @@ class Emulated:
         swarm = self.swarm or scenario.name
         uav = make_uav(scenario, node, swarm, position=self.position, applications=applications)
         file = config_of(self.zenoh_config, uav.name)
-        bus = await asyncio.to_thread(Bus.join, self.endpoint, file, patience_s=self.patience_s)
-        with bus:
+        with await Bus.join_on_loop(self.endpoint, file, patience_s=self.patience_s) as bus:
             async with _running(uav, RealtimeHost(uav, bus, Topics(swarm)), scenario) as drive:
                 yield drive
 
@@ -203,7 +202,7 @@ class OnAir:
             raise ConfigError(f"the UDP port of a real radio = {self.port}: must be in [1, {MAX_PORT}]")
         names = Topics(self.swarm or scenario.name)
         epoch_unix_ns = None if self.epoch_unix_s is None else given_epoch_ns(self.epoch_unix_s, scenario)
-        with joined(self.endpoint, config_of(self.zenoh_config, uav.name)) as inner:
+        async with joined(self.endpoint, config_of(self.zenoh_config, uav.name)) as inner:
             bus = FieldBus(names, node, inner=inner, epoch_unix_ns=epoch_unix_ns)
             host = RealtimeHost(uav, through(bus), names)
             radio = UdpRadio(

@@ -5,6 +5,7 @@ dropped under congestion, because late ones are worse than lost ones, and gaps a
 reliable.
 """
 
+import asyncio
 import base64
 import contextlib
 import json
@@ -169,26 +170,28 @@ class Bus:
         """Open a session as a client of a router; raises BusError when none answers, ConfigError for an unusable file.
         On a busy machine a handshake may take seconds, so a launched process has more patience.
         """
-        _require_endpoint(endpoint)
-        os.environ.setdefault(_RUNTIME_VARIABLE, _ONE_RUNTIME)
-        waited_s, listens = 0.0, False
+        joining = _Joining(endpoint, config, patience_s)
         while True:
-            waited_s += patience_s
-            settings = _config(mode="client", listen=None, connect=endpoint, file=config, patience_s=patience_s)
             try:
-                return cls(_opened(settings), endpoint)
+                return cls(_opened(joining.settings()), endpoint)
             except zenoh.ZError as error:
-                if not listens and (listens := _somebody_listens(endpoint)):
-                    patience_s = BUSY_PATIENCE_S
-                    continue
-                if (off := _clock_outside_certificate(config)) is not None:
-                    raise BusError(f"no Zenoh router at {endpoint}: {off}") from error
-                why = "no answer" if "onnect" in str(error) else _first_sentence(error)
-                raise BusError(
-                    f"no Zenoh router at {endpoint} ({why} within {waited_s:g} s"
-                    f"{', although somebody listens there' if listens else ''}); "
-                    f"start one with `fanet router SCENARIO` or `fanet launch SCENARIO`, and --listen {endpoint}"
-                ) from error
+                joining.failed(error)
+
+    @classmethod
+    async def join_on_loop(
+        cls, endpoint: str, config: Path | None = None, *, patience_s: float = JOIN_PATIENCE_S
+    ) -> Self:
+        """As `join`, while the event loop goes on: signals that it handles reach who waits, and cancel the wait."""
+        joining = _Joining(endpoint, config, patience_s)
+        while True:
+            opening = _opening(joining.settings())
+            try:
+                return cls(await asyncio.wrap_future(opening), endpoint)
+            except zenoh.ZError as error:
+                joining.failed(error)
+            except asyncio.CancelledError:
+                _abandon(opening)
+                raise
 
     def __enter__(self) -> Self:
         return self
@@ -294,8 +297,41 @@ def _clock_outside_certificate(config: Path | None) -> str | None:
     return None
 
 
-def _opened(settings: zenoh.Config) -> zenoh.Session:
-    """A session, opened on a thread of its own, because no signal interrupts Zenoh while it waits for a router."""
+class _Joining:
+    """The attempts to open a session with one router: the settings of the next, and when to give up."""
+
+    def __init__(self, endpoint: str, config: Path | None, patience_s: float) -> None:
+        _require_endpoint(endpoint)
+        os.environ.setdefault(_RUNTIME_VARIABLE, _ONE_RUNTIME)
+        self._endpoint, self._config, self._patience_s = endpoint, config, patience_s
+        self._waited_s, self._listens = 0.0, False
+
+    def settings(self) -> zenoh.Config:
+        self._waited_s += self._patience_s
+        return _config(
+            mode="client", listen=None, connect=self._endpoint, file=self._config, patience_s=self._patience_s
+        )
+
+    def failed(self, error: zenoh.ZError) -> None:
+        """An attempt has failed; raises BusError unless another one makes sense."""
+        endpoint = self._endpoint
+        if not self._listens and _somebody_listens(endpoint):
+            self._listens, self._patience_s = True, BUSY_PATIENCE_S
+            return
+        if (off := _clock_outside_certificate(self._config)) is not None:
+            raise BusError(f"no Zenoh router at {endpoint}: {off}") from error
+        why = "no answer" if "onnect" in str(error) else _first_sentence(error)
+        raise BusError(
+            f"no Zenoh router at {endpoint} ({why} within {self._waited_s:g} s"
+            f"{', although somebody listens there' if self._listens else ''}); "
+            f"start one with `fanet router SCENARIO` or `fanet launch SCENARIO`, and --listen {endpoint}"
+        ) from error
+
+
+def _opening(settings: zenoh.Config) -> Future[zenoh.Session]:
+    """A session, opened on a thread of its own, because no signal interrupts Zenoh while it waits for a router. After
+    the future was canceled it is closed as soon as it is open.
+    """
     opening: Future[zenoh.Session] = Future()
 
     def work() -> None:
@@ -311,11 +347,23 @@ def _opened(settings: zenoh.Config) -> zenoh.Session:
             session.close()  # type: ignore[no-untyped-call]  # zenoh's stub lacks it
 
     threading.Thread(target=work, name="opens a session", daemon=True).start()
+    return opening
+
+
+def _opened(settings: zenoh.Config) -> zenoh.Session:
+    """A session; a signal interrupts the wait for it."""
+    opening = _opening(settings)
     try:
         return opening.result()
     except KeyboardInterrupt:
-        opening.cancel()
+        _abandon(opening)
         raise
+
+
+def _abandon(opening: Future[zenoh.Session]) -> None:
+    """Nobody waits for this session any more: close it now, or once it is open."""
+    if not opening.cancel() and opening.exception() is None:
+        opening.result().close()  # type: ignore[no-untyped-call]  # zenoh's stub lacks it
 
 
 def _somebody_listens(endpoint: str) -> bool:

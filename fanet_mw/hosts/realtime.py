@@ -372,6 +372,6 @@ async def run_actor(
 ) -> None:
     """Join a router, run one actor, leave. Raises BusError, and ConfigError if the swarm runs another scenario."""
     config = config_of(address.zenoh_config, actor.name)
-    with Bus.join(address.endpoint, config, patience_s=address.patience_s) as bus:
+    with await Bus.join_on_loop(address.endpoint, config, patience_s=address.patience_s) as bus:
         host = RealtimeHost(actor, bus, Topics(address.swarm), timebase)
         await host.run(until_ns=until_ns, clock_timeout_s=clock_timeout_s, scenario=scenario, on_epoch=on_epoch)

@@ -5,7 +5,7 @@ traces, telemetry and reports stay with the node.
 """
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Protocol
 
@@ -82,11 +82,11 @@ def _decoded(payload: bytes) -> list[Message]:
     return list(codecs.decode(payload))
 
 
-@contextlib.contextmanager
-def joined(endpoint: str | None, config: Path | None = None) -> Iterator[Bus | None]:
+@contextlib.asynccontextmanager
+async def joined(endpoint: str | None, config: Path | None = None) -> AsyncIterator[Bus | None]:
     """A session with the router if an endpoint is given; `config` is a configuration file of Zenoh."""
     if endpoint is None:
         yield None
         return
-    with Bus.join(endpoint, config) as bus:
+    with await Bus.join_on_loop(endpoint, config) as bus:
         yield bus

@@ -101,7 +101,19 @@ def test_a_world_of_flight_controllers_that_waits_for_the_clock_ends_when_interr
     assert router.announced, "it was interrupted only after it had come up"
 
 
-@pytest.mark.parametrize("words", [["gateway"], ["autopilots", "udpin:127.0.0.1:14999+"]], ids=lambda words: words[0])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["gateway"],
+        ["autopilots", "udpin:127.0.0.1:14999+"],
+        ["world", "quick"],
+        ["emulator", "quick"],
+        ["agent", "quick", "--id", "1"],
+        ["agent", "quick", "--id", "1", "--autopilot", "udpin:127.0.0.1:14999"],
+        ["agent", "quick", "--id", "1", "--radio-address", "127.0.0.1", "--radio-broadcast", "127.255.255.255"],
+    ],
+    ids=lambda words: " ".join((words[0], *words[4:5])),
+)
 def test_a_command_that_waits_for_a_router_which_does_not_answer_ends_at_once_when_interrupted(
     words: list[str],
 ) -> None:
